@@ -10,7 +10,7 @@ use acceptance::monolithic::{table_acceleration, table_acceleration_under, worst
 use fmi_master::Algorithm;
 use laboratory::run::experiment::{Request, prepare};
 use laboratory::run::refinement::refine;
-use pages::report::{Abscissa, Axis, Panel, Series, Units, svg};
+use pages::report::{Abscissa, Axis, Panel, Series, UnitSystem, Units, svg};
 use plant::identified::shake_table::ShakeTable;
 use plant::specimens::linear::LinearSpecimen;
 
@@ -105,7 +105,7 @@ fn draw() -> Result<(), Box<dyn std::error::Error>> {
         series,
     };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/coupling.svg");
-    std::fs::write(&file, svg(&panel))?;
+    std::fs::write(&file, svg(&panel, UnitSystem::Us))?;
     println!("written: {}", file.display());
     Ok(())
 }

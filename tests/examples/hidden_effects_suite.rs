@@ -16,7 +16,7 @@ use std::process::ExitCode;
 use acceptance::hidden_suite::{Plan, beside_each_other, picture, run_all, table};
 use hidden_effects::World;
 use hidden_effects::catalogue::entry;
-use pages::report::svg;
+use pages::report::{UnitSystem, svg};
 use study::campaign::{Progress, Shard};
 
 fn main() -> ExitCode {
@@ -127,7 +127,7 @@ fn main() -> ExitCode {
     }
     println!("{}", beside_each_other(&results));
     if let Some(file) = drawn
-        && let Err(error) = fs::write(&file, svg(&picture(&results)))
+        && let Err(error) = fs::write(&file, svg(&picture(&results), UnitSystem::Us))
     {
         eprintln!("{}: {error}", file.display());
         return ExitCode::from(2);

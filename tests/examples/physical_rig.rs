@@ -9,7 +9,9 @@ use std::path::Path;
 use acceptance::native_rig::{NativeRig, PERIOD};
 use motion::{self, Options};
 use nalgebra::Complex;
-use pages::report::{Abscissa, Axis, Panel, Report, Section, Series, Style, Units, html, svg};
+use pages::report::{
+    Abscissa, Axis, Panel, Report, Section, Series, Style, UnitSystem, Units, html, svg,
+};
 use plant::identified::shake_table::ShakeTable;
 use plant::linear::log_space;
 use plant::servo_hydraulic::{ServoHydraulicInput, ServoHydraulicTable};
@@ -101,7 +103,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let names = ["response", "steps", "sines", "hysteresis"];
         for (name, panel) in names.into_iter().zip(&panels) {
             let file = docs.join(format!("physical_rig_{name}.svg"));
-            std::fs::write(&file, svg(panel))?;
+            std::fs::write(&file, svg(panel, UnitSystem::Us))?;
             println!("written: {}", file.display());
         }
         return Ok(());
@@ -115,7 +117,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }],
         ..Report::default()
     };
-    std::fs::write(&file, html(&report)?)?;
+    std::fs::write(&file, html(&report, None)?)?;
     println!("written: {file}");
     Ok(())
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use fmi_master::Algorithm;
 use laboratory::run::experiment::{Request, prepare};
-use pages::report::{Abscissa, Axis, Panel, Series, Units, svg};
+use pages::report::{Abscissa, Axis, Panel, Series, UnitSystem, Units, svg};
 
 /// Seconds shown.
 const WINDOW: [f64; 2] = [7.0, 9.0];
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         series,
     };
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/tracking.svg");
-    std::fs::write(&file, svg(&panel))?;
+    std::fs::write(&file, svg(&panel, UnitSystem::Us))?;
     println!("written: {}", file.display());
     Ok(())
 }

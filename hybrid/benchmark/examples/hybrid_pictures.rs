@@ -8,7 +8,7 @@ use hybrid::vrths::{BenchmarkCase, InteractionForm};
 use hybrid_benchmark::vrths::outcome::Outcome;
 use hybrid_benchmark::vrths::study::{Plants, Study};
 use hybrid_benchmark::vrths::{motions, page, roster};
-use pages::report::svg;
+use pages::report::{UnitSystem, svg};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let names = [roster::SAMPLE, roster::BEST];
@@ -34,7 +34,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "subspace_best",
     ];
     for (panel, file) in panels.zip(files) {
-        fs::write(docs.join(format!("hybrid_{file}.svg")), svg(panel))?;
+        fs::write(
+            docs.join(format!("hybrid_{file}.svg")),
+            svg(panel, UnitSystem::Us),
+        )?;
     }
     Ok(())
 }

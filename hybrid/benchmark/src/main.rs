@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use hybrid_benchmark::{console, marths, vrths};
 use laboratory::error;
+use laboratory::results::Out;
 use pages::report::UnitSystem;
 
 /// Run a published benchmark and score controllers by its rules
@@ -37,12 +38,10 @@ enum Benchmark {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    if let Some(units) = cli.units {
-        units.choose();
-    }
+    let results = Out::new(".").replacing(cli.force).in_units(cli.units);
     let done = match cli.benchmark {
-        Benchmark::Vrths(arguments) => vrths::command::execute(&arguments, cli.force),
-        Benchmark::Marths(arguments) => marths::command::execute(&arguments, cli.force),
+        Benchmark::Vrths(arguments) => vrths::command::execute(&arguments, &results),
+        Benchmark::Marths(arguments) => marths::command::execute(&arguments, &results),
     };
     done.unwrap_or_else(|error| {
         console::complain(&format!("error: {}", error::clipped(&error.to_string())));

@@ -21,6 +21,7 @@ use fmi_master::{Algorithm, Pace};
 use laboratory::run::experiment::{Prepared, Request, prepare};
 use motion::Motion;
 use pages::live::{Scene, Tap};
+use pages::report::UnitSystem;
 use plant::identified::shake_table::{ShakeTable, ShakeTableState};
 use plant::specimens::linear::{LinearSpecimen, SpecimenState};
 
@@ -116,7 +117,7 @@ fn main() {
         21,
         || {
             let mut simulation = watched.simulation(Algorithm::GaussSeidel).unwrap();
-            let (_, places) = Scene::new(watched.shown(), simulation.names());
+            let (_, places) = Scene::new(watched.shown(), simulation.names(), UnitSystem::Us);
             simulation.watch(Arc::new(Tap::new(places, watched.samples)));
             simulation
         },

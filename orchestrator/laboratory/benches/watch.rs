@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 use fmi_master::{Algorithm, Pace};
 use laboratory::run::experiment::{Prepared, Request, prepare};
 use pages::live::{Scene, Server, Tap};
+use pages::report::UnitSystem;
 
 const SECONDS: f64 = 10.0;
 const RUNS: usize = 31;
@@ -53,7 +54,7 @@ fn run(prepared: &Prepared, watched: Watched) -> f64 {
     let mut simulation = prepared.simulation(Algorithm::GaussSeidel).unwrap();
     let mut server = None;
     if watched != Watched::No {
-        let (scene, places) = Scene::new(prepared.shown(), simulation.names());
+        let (scene, places) = Scene::new(prepared.shown(), simulation.names(), UnitSystem::Us);
         let tap = Arc::new(Tap::new(places, prepared.samples));
         simulation.watch(tap.clone());
         if watched == Watched::Read {

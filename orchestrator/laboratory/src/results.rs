@@ -7,17 +7,18 @@ use std::io::{self, BufWriter, Write};
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
-use pages::report::{self, Report};
+use pages::report::{self, Panel, Report, UnitSystem};
 use serde::Serialize;
 
 use crate::error::Error;
 
-/// A folder or file that results go to. What is there already stays if it differs, unless [`Out::replacing`] says
-/// otherwise.
+/// A folder or file that results go to, and the units of its pages. What is there already stays if it differs, unless
+/// [`Out::replacing`] says otherwise.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Out {
     path: PathBuf,
     replaces: bool,
+    units: Option<UnitSystem>,
 }
 
 impl Out {
@@ -26,6 +27,7 @@ impl Out {
         Self {
             path: path.into(),
             replaces: false,
+            units: None,
         }
     }
 
@@ -41,10 +43,25 @@ impl Out {
         self.replaces
     }
 
-    /// Another place, where the same is allowed.
+    /// The same, with pages and pictures in these units; none: a page has buttons to switch.
+    #[must_use]
+    pub fn in_units(self, units: Option<UnitSystem>) -> Self {
+        Self { units, ..self }
+    }
+
+    /// Units of sentences and pictures.
+    #[must_use]
+    pub fn units(&self) -> UnitSystem {
+        self.units.unwrap_or_default()
+    }
+
+    /// Another place, where the same holds.
     #[must_use]
     pub fn at(&self, path: &Path) -> Self {
-        Self::new(path).replacing(self.replaces)
+        Self {
+            path: path.to_path_buf(),
+            ..self.clone()
+        }
     }
 
     /// The folder of this file.
@@ -200,12 +217,10 @@ fn is_full(error: &io::Error) -> bool {
 /// # Errors
 /// A folder that cannot be written.
 pub fn write_report(report: &Report, folder: &Out) -> Result<PathBuf, Error> {
-    let path = folder.join(report::FILE);
-    let page = report::render(report, &path)?;
     let mut results = Results::begin(folder)?;
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, report)?;
     results.finish()?;
-    Ok(path)
+    Ok(folder.join(report::FILE))
 }
 
 /// Files that tell how long something took, draw what others hold or pack it: they may differ from one
@@ -331,6 +346,23 @@ impl Results {
     /// As [`Results::write`].
     pub fn write_text(&mut self, name: &str, text: &str) -> Result<(), ResultsError> {
         self.write(name, |file| file.write_all(text.as_bytes()))
+    }
+
+    /// Writes the page of a report.
+    ///
+    /// # Errors
+    /// As [`Results::write`]; a fault of the template.
+    pub fn write_page(&mut self, name: &str, report: &Report) -> Result<(), Error> {
+        let page = report::render(report, self.folder.units, &self.folder.join(name))?;
+        Ok(self.write_text(name, &page)?)
+    }
+
+    /// Writes a plot as SVG.
+    ///
+    /// # Errors
+    /// As [`Results::write`].
+    pub fn write_picture(&mut self, name: &str, panel: &Panel) -> Result<(), ResultsError> {
+        self.write_text(name, &report::svg(panel, self.folder.units()))
     }
 
     /// Writes a value as JSON for people, one line per field.
@@ -531,5 +563,7 @@ mod tests {
             (Path::new("models"), true)
         );
         assert_eq!(&*Out::new("rig.toml").folder(), Path::new("."));
+        let metric = out.in_units(Some(UnitSystem::Si)).folder();
+        assert_eq!((metric.units(), metric.replaces()), (UnitSystem::Si, true));
     }
 }

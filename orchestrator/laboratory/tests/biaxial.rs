@@ -7,6 +7,7 @@ use laboratory::run::manifest::Manifest;
 use laboratory::run::page;
 use laboratory::run::summary::Summary;
 use motion::Scaling;
+use pages::report::UnitSystem;
 
 const SECONDS: f64 = 6.0;
 
@@ -107,7 +108,7 @@ fn the_page_has_both_axes_and_can_be_made_again() {
         ..request("biaxial", &[])
     };
     laboratory::run::perform(&request, &laboratory::results::Out::new(place.path())).unwrap();
-    let page = page::page_again(place.path()).unwrap();
+    let page = page::page_again(place.path(), UnitSystem::Us).unwrap();
     let headings: Vec<&str> = page
         .sections
         .iter()

@@ -15,7 +15,7 @@ use pack::{self, FmiVersion, Platform, UnknownPlatform};
     shakebench build --merge fmus-linux fmus-mac --out fmus\n  \
     shakebench build --libraries x86_64-linux=LIB --libraries x86_64-windows=DLL --out fmus")]
 pub struct Arguments {
-    /// Version of FMI
+    /// FMI version
     #[arg(long, value_enum, default_value = "all")]
     fmi: Versions,
     /// Folder for fmi2/NAME.fmu and fmi3/NAME.fmu [default: target/fmus]

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::out::{given, installation, unused};
+use super::out::{given, installation, units, unused};
 use super::{interrupt, progress};
 use laboratory::error::Error;
 use laboratory::results::{Out, Results};
@@ -112,7 +112,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if is_whole {
         let findings = campaign::findings(&study, &bench, &carried)?;
         files = campaign::write(&study, &carried, &findings, &folder)?;
-        said = campaign::page::summary(&findings);
+        said = campaign::page::summary(&findings, units());
         if let Some(ranking) = &findings.ranking {
             said += &format!("\n\n{}", aligned(&campaign::page::standings(ranking)));
             for line in campaign::page::sentences(ranking) {

@@ -60,7 +60,7 @@ pub struct Arguments {
     /// Duration of the motion on which the tracking error is predicted
     #[arg(long, value_name = "T", default_value = "20 s")]
     played: String,
-    /// Version of FMI of the components
+    /// FMI version of the components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
     /// Folder for recordings, model, systems and report

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 
-use super::out::{given, installation, unused};
+use super::out::{given, installation, units, unused};
 use super::quantity::{if_given, whole};
 use super::rig::RigArguments;
 use super::{figures, print_files, progress};
@@ -168,7 +168,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 .into(),
         });
     }
-    let found = run_comparison::read(&folders)?;
+    let found = run_comparison::read(&folders, units())?;
     report_runs(arguments, &found, &arguments.out("runs"))
 }
 
@@ -318,7 +318,7 @@ fn with_new_runs(
         }
     }
     bar.finish_and_clear();
-    report_runs(arguments, &run_comparison::read(&all)?, &folder)
+    report_runs(arguments, &run_comparison::read(&all, units())?, &folder)
 }
 
 /// Overlays runs and lists their differences.
@@ -332,7 +332,7 @@ fn report_runs(
         super::print_json(serde_json::json!(comparison), folder);
         return Ok(ExitCode::SUCCESS);
     }
-    println!("{}", aligned(&comparison.figures()));
+    println!("{}", aligned(&comparison.figures(units())));
     let mut rows = vec![vec!["differs".to_string()]];
     rows[0].extend(comparison.runs.iter().map(|run| run.label.clone()));
     let differences = comparison.differences.iter();

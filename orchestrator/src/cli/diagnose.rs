@@ -10,7 +10,7 @@ use clap::Args;
 use identification::diagnosis::DiagnosisReport;
 use identification::diagnosis::engine::{Deadline, Observer, Progress};
 
-use super::out::{given, installation, unused};
+use super::out::{given, installation, units, unused};
 use super::{multivariable, progress};
 use fmi_import::Isolation;
 use identification::diagnosis::rigs::guess::Guess;
@@ -253,7 +253,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 guessed.take()
             );
         }
-        print!("{}", text::text(&report));
+        print!("{}", text::text(&report, units()));
         println!("\nwritten ({:.1} s):", report.wall_s);
         for file in files(&report, &folder) {
             println!("  {}", file.display());

@@ -41,7 +41,7 @@ pub struct Arguments {
     /// Parameter, such as control.valve_limit="5 V"; repeatable
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Version of FMI of the components: 2 for an archive of SSP 1.0, 3 for one of SSP 2.0
+    /// FMI version of the components: 2 for an archive of SSP 1.0, 3 for one of SSP 2.0
     #[arg(long, value_enum, default_value_t = Version::Two)]
     fmi: Version,
     /// Order of calls for which the parameters are computed; most SSP importers step all components
@@ -56,7 +56,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Version of FMI of an archive's components.
+/// FMI version of an archive's components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Version {
     /// FMI 2.0

@@ -7,12 +7,12 @@ use std::process::ExitCode;
 use clap::Args;
 use identification::identify::identified::RigIdentification;
 
-use super::out::is_forced;
+use super::out::{asked_units, given};
 use super::{multivariable, progress};
 use laboratory::error::Error;
 use laboratory::identify::{
     EQUATION_COLUMNS, Form, HydraulicIdentification, ONE_INPUT_COLUMNS, OneInputIdentification,
-    Outcome, PARAMETER_COLUMNS, Parameter, Request, Summary, identify, parameters,
+    Outcome, PARAMETER_COLUMNS, Request, Summary, identify, parameters,
 };
 use pages::report::columns::aligned;
 use pages::report::number::significant;
@@ -86,7 +86,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     });
     bar.finish_and_clear();
     let identified = identified?;
-    identified.write(is_forced())?;
+    identified.write(&given(&identified.summary().model))?;
     if arguments.json {
         println!(
             "{}",
@@ -194,7 +194,11 @@ fn text(found: &RigIdentification, summary: &Summary) -> String {
             .map(String::from)
             .to_vec(),
     ];
-    rows.extend(parameters(found).iter().map(|row| row.text().to_vec()));
+    rows.extend(
+        parameters(found)
+            .iter()
+            .map(|row| row.text(asked_units()).to_vec()),
+    );
     text += &format!("\n{}", aligned(&rows));
     for (index, (payload, error)) in found.payload.iter().enumerate().skip(1) {
         text += &format!(
@@ -283,10 +287,9 @@ fn one_input_text(own: &OneInputIdentification, summary: &Summary) -> String {
 fn hydraulic_text(own: &HydraulicIdentification, summary: &Summary) -> String {
     let (mut text, rest) = beginning(summary);
     text += "hydraulic rig, with the reference as instrument\n\n";
-    text += &table(
-        PARAMETER_COLUMNS,
-        own.parameters().iter().map(Parameter::text).collect(),
-    );
+    let rows = own.parameters();
+    let rows = rows.iter().map(|row| row.text(asked_units()));
+    text += &table(PARAMETER_COLUMNS, rows.collect());
     text += &format!("\n{}", table(EQUATION_COLUMNS, own.equations()));
     text + &ending(rest, summary)
 }

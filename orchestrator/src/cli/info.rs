@@ -1,6 +1,6 @@
 //! `shakebench info`
 
-use super::out::installation;
+use super::out::{self, installation};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -16,7 +16,7 @@ use laboratory::systems::tuning::Wanted;
 use pack::library::FmuLibrary;
 use pages::report::columns::last_left;
 use pages::report::number::significant;
-use pages::report::{Cell, UnitSystem, Units};
+use pages::report::{Cell, Units};
 
 /// Options of `shakebench info`.
 #[derive(Debug, Args)]
@@ -278,7 +278,7 @@ fn motion(path: &Path) -> Result<Content, Error> {
     for note in &playable.notes {
         text += &format!("  {note}\n");
     }
-    let shown = |value, units| Cell::Quantity(value, units, 4).text(UnitSystem::of_text());
+    let shown = |value, units| Cell::Quantity(value, units, 4).text(out::units());
     text += &format!(
         "  as played: {} s, {} samples of {} ms, {}, {}, {}\n",
         significant(playable.duration(), 4),

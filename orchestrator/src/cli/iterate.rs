@@ -126,7 +126,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.command_limit.is_some() {
         return Err(Error::Option {
             option: "--command-limit",
-            reason: "expected --replay, or --model of a described rig, with it".into(),
+            reason: "also pass --replay, or --model with a described rig".into(),
         });
     }
     let plan = plan(arguments)?;

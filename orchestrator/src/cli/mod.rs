@@ -77,8 +77,8 @@ pub struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
     /// Units of printed output and pages: us (in, lbf) or si (mm, kN); accelerations in g. Data
-    /// files are always SI [default: us; pages have buttons to switch]. For `serve`: length and force
-    /// of the client, such as in,kip
+    /// files are always SI [default: us; pages have buttons to switch]. For `serve`: units of length
+    /// and force of the client, such as in,kip
     #[arg(long, value_parser = GivenUnits::read, global = true, value_name = "SYSTEM")]
     units: Option<GivenUnits>,
     /// Replace existing result files that differ
@@ -254,7 +254,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(2);
         }
         Some(GivenUnits::System(units)) => {
-            units.choose();
+            out::choose(units);
             (Some(units), None)
         }
         None => (None, None),

@@ -20,7 +20,7 @@ pub struct MotionArguments {
         conflicts_with = "reference"
     )]
     pub record: Option<PathBuf>,
-    /// Ground motion along the second axis of a biaxial table, with one scale for both; without it that axis rests
+    /// Ground motion along the second axis of a biaxial table, scaled like the first; without it, that axis stays at rest
     #[arg(long, value_name = "FILE", requires = "record")]
     pub record_y: Option<PathBuf>,
     /// Reference: .csv with time, displacement, velocity, acceleration, played as given

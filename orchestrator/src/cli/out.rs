@@ -1,4 +1,4 @@
-//! Where a command's results go, `--force`, and where components come from.
+//! Where a command's results go, `--force`, `--units`, and where components come from.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -6,8 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use laboratory::results::{self, Out};
 use pack::{Installation, program};
+use pages::report::UnitSystem;
 
 static INSTALLATION: OnceLock<Installation> = OnceLock::new();
+static UNITS: OnceLock<UnitSystem> = OnceLock::new();
 static IS_FORCED: AtomicBool = AtomicBool::new(false);
 
 /// Lets this command replace files that differ.
@@ -20,9 +22,27 @@ pub fn is_forced() -> bool {
     IS_FORCED.load(Ordering::Relaxed)
 }
 
+/// Reads this command's results in `units`.
+pub fn choose(units: UnitSystem) {
+    // The first holds; there is no second.
+    let _ = UNITS.set(units);
+}
+
+/// Units that were asked for.
+pub fn asked_units() -> Option<UnitSystem> {
+    UNITS.get().copied()
+}
+
+/// Units of what this command prints.
+pub fn units() -> UnitSystem {
+    asked_units().unwrap_or_default()
+}
+
 /// The folder or file at `path`, for results.
 pub fn given(path: impl Into<PathBuf>) -> Out {
-    Out::new(path).replacing(is_forced())
+    Out::new(path)
+        .replacing(is_forced())
+        .in_units(asked_units())
 }
 
 /// As [`results::unused`].

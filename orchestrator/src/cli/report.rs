@@ -1,6 +1,6 @@
 //! `shakebench report`
 
-use super::out::given;
+use super::out::{given, units};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -43,11 +43,11 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     }
     let has = |name: &str| folder.join(name).is_file();
     let (kind, page) = if has("manifest.json") || has("results.csv") {
-        ("run", page::page_again(folder)?)
+        ("run", page::page_again(folder, units())?)
     } else if has(comparison::COMPARISON) {
         ("comparison", comparison::page_again(folder)?)
     } else if has(diagnosis::DIAGNOSIS) {
-        ("diagnosis", diagnosis::page_again(folder)?)
+        ("diagnosis", diagnosis::page_again(folder, units())?)
     } else if let Some(command) = made_by(folder) {
         return Err(fault(&format!(
             "its page contains more than its other files; expected the folder of a run, a \

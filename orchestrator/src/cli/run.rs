@@ -10,7 +10,7 @@ use clap::Args;
 use super::OneVersion;
 use super::interrupt;
 use super::motion::MotionArguments;
-use super::out::{given, installation, is_forced, unused};
+use super::out::{given, installation, is_forced, units, unused};
 use super::quantity::{at_least_one, if_given, percent, positive};
 use super::rig::RigArguments;
 use super::watch::watch;
@@ -56,7 +56,7 @@ pub struct Arguments {
     /// Parameter, such as control.valve_limit="5 V"; repeatable
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Version of FMI of the components
+    /// FMI version of the components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
     /// Order of calls [default: from the system, otherwise gauss-seidel]
@@ -286,7 +286,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     if arguments.json {
         super::print_json(serde_json::json!(summary), &folder);
     } else {
-        print!("{}", text(&summary, &outcome.record, motion));
+        print!("{}", text(&summary, &outcome.record, motion, units()));
         println!();
         print_files(&files);
     }

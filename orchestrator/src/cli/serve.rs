@@ -9,7 +9,7 @@ use bridges::element::{Interval, Moves, Shape};
 use bridges::{Admission, Event};
 use clap::{Args, ValueEnum};
 
-use super::out::{given, unused};
+use super::out::{self, given, unused};
 use super::quantity::{at_least_one, if_given, positive};
 use super::rig::RigArguments;
 use super::{OneVersion, interrupt, run};
@@ -124,7 +124,7 @@ pub struct Arguments {
     /// Parameter, such as control.valve_limit="5 V"; may be given several times
     #[arg(long, value_name = "INSTANCE.VARIABLE=VALUE")]
     set: Vec<String>,
-    /// Version of FMI of the project's own components
+    /// FMI version of the project's own components
     #[arg(long, value_enum, default_value_t)]
     fmi: OneVersion,
     /// Coupling step [default: that of the system]
@@ -159,7 +159,7 @@ pub fn execute(arguments: &Arguments, units: Option<&str>) -> Result<ExitCode, E
     say_what(&service);
     let n = service.channels().degrees_of_freedom();
     let mut watched = match arguments.watch {
-        Some(port) => Some(Watched::start(&arguments.system, n, port)?),
+        Some(port) => Some(Watched::start(&arguments.system, n, port, out::units())?),
         None => None,
     };
     if let Some(watched) = &watched {

@@ -9,8 +9,8 @@ use super::out::given;
 use laboratory::error::Error;
 use laboratory::qualify::{spectrum_panel, trs_page};
 use laboratory::results::Results;
+use pages::report;
 use pages::report::columns::aligned;
-use pages::report::{self, svg};
 use qualification::{Verdict, doubts, load};
 
 /// Options of `shakebench trs`.
@@ -50,14 +50,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let verdict = Verdict::new(&rule, &record.acceleration, record.dt, warnings);
     let mut written = Vec::new();
     if let Some(folder) = &arguments.out {
-        let page = report::render(
-            &trs_page(&rule, &record, &verdict),
-            &folder.join(report::FILE),
-        )?;
         let mut results = Results::begin(&given(folder))?;
-        results.write_text(report::FILE, &page)?;
+        results.write_page(report::FILE, &trs_page(&rule, &record, &verdict))?;
         let panel = spectrum_panel(&rule, &record.acceleration, record.dt);
-        results.write_text("spectra.svg", &svg(&panel))?;
+        results.write_picture("spectra.svg", &panel)?;
         written = results.finish()?;
     }
     if arguments.json {

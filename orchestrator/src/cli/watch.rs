@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::out::units;
 use fmi_master::Simulation;
 use laboratory::error::Error;
 use laboratory::run::experiment::Prepared;
@@ -18,7 +19,7 @@ pub(super) fn watch(
     port: u16,
     tune: &[String],
 ) -> Result<(Server, Arc<Tap>), Error> {
-    let (scene, places) = Scene::new(prepared.shown(), simulation.names());
+    let (scene, places) = Scene::new(prepared.shown(), simulation.names(), units());
     let tap = Arc::new(Tap::new(places, prepared.samples));
     let tuning = match tune {
         [] => None,
@@ -27,7 +28,7 @@ pub(super) fn watch(
             let panel = Arc::new(panel);
             simulation.tune(Arc::clone(&panel))?;
             let seconds = panel.samples() as f64 * prepared.motion.dt;
-            Some(Tuning::new(&prepared.system, panel, seconds))
+            Some(Tuning::new(&prepared.system, panel, seconds, units()))
         }
     };
     let server = Server::start(&scene, Arc::clone(&tap), tuning, port);

@@ -124,7 +124,9 @@ pub enum Misfit {
     )]
     ComponentName,
     /// A table whose name means something else.
-    #[error("this name belongs to the motion or a component, or has a `.`")]
+    #[error(
+        "the name is that of the motion or of another component, or contains a `.`; choose another name"
+    )]
     TableName,
     /// An input with two sources.
     #[error("`{input}` is already driven by `{source_before}`")]

@@ -61,7 +61,7 @@ pub enum TerminalError {
     },
     /// A plug that lacks a member.
     #[error(
-        "the terminal `{terminal}` has no member `{member}`; plugs fit where both have the same members"
+        "the terminal `{terminal}` has no member `{member}`; connect terminals that have the same members"
     )]
     NoMember {
         /// The terminal that lacks it.

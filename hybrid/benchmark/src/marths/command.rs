@@ -57,7 +57,7 @@ pub struct Marths {
 ///
 /// # Errors
 /// Unknown names: nothing is run then; a folder that cannot be written.
-pub fn execute(arguments: &Marths, replaces: bool) -> Result<ExitCode, Error> {
+pub fn execute(arguments: &Marths, results: &Out) -> Result<ExitCode, Error> {
     let folder = data_folder("marths", arguments.data.as_deref());
     if let (Some(given), None) = (&arguments.data, &folder) {
         return Err(Error::File {
@@ -82,7 +82,7 @@ pub fn execute(arguments: &Marths, replaces: bool) -> Result<ExitCode, Error> {
         seed: arguments.seed,
     };
     let given = arguments.out.as_deref();
-    let out = given.map(|path| Out::new(path).replacing(replaces));
+    let out = given.map(|path| results.at(path));
     if let Some(out) = &out {
         Results::check(out)?;
     }
@@ -140,9 +140,8 @@ fn controllers(names: &[String]) -> Result<Vec<roster::Entry>, Error> {
 
 /// Writes report, scores and one row per run.
 fn write(folder: &Out, outcome: &Outcome) -> Result<Vec<PathBuf>, Error> {
-    let page = report::render(&page::report(outcome), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, &page::report(outcome))?;
     results.write("scores.json", |file| {
         serde_json::to_writer_pretty(file, outcome).map_err(std::io::Error::other)
     })?;

@@ -100,7 +100,7 @@ const STIFFNESSES: u32 = 10;
 ///
 /// # Errors
 /// Unknown names and numbers out of range: nothing is run then; a folder that cannot be written.
-pub fn execute(arguments: &Vrths, replaces: bool) -> Result<ExitCode, Error> {
+pub fn execute(arguments: &Vrths, results: &Out) -> Result<ExitCode, Error> {
     let folder = motions::data_folder("vrths", arguments.data.as_deref());
     if let (Some(given), None) = (&arguments.data, &folder) {
         return Err(Error::File {
@@ -111,7 +111,7 @@ pub fn execute(arguments: &Vrths, replaces: bool) -> Result<ExitCode, Error> {
     }
     let study = study(arguments, folder.as_deref())?;
     let given = arguments.out.as_deref();
-    let out = given.map(|path| Out::new(path).replacing(replaces));
+    let out = given.map(|path| results.at(path));
     if let Some(out) = &out {
         Results::check(out)?;
     }
@@ -286,9 +286,8 @@ fn controllers(names: &[String]) -> Result<Vec<roster::Entry>, Error> {
 
 /// Writes report, scores and one row per run.
 fn write(folder: &Out, outcome: &Outcome, page: &report::Report) -> Result<Vec<PathBuf>, Error> {
-    let page = report::render(page, &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, page)?;
     results.write("scores.json", |file| {
         serde_json::to_writer_pretty(file, outcome).map_err(std::io::Error::other)
     })?;

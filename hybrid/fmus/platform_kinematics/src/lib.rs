@@ -80,7 +80,7 @@ impl PlatformKinematics {
     /// The closed form, for two actuators along x on a platform that moves along x and turns about z.
     fn closed(&self) -> Result<Coupler, Box<dyn std::error::Error>> {
         let Some(platform) = &self.platform else {
-            return Err("the platform is not known yet".into());
+            return Err("the platform is unknown before the FMU is initialized".into());
         };
         let pins = platform.parallel_pins().ok_or(
             "`way_back` is first_stroke, which is the closed form of two actuators with `directions` 1 0 0 and `free` x \

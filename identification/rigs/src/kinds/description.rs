@@ -1,7 +1,9 @@
 //! The description of a rig and its measurements, as people write it.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
@@ -10,6 +12,25 @@ use super::hypotheses::{self, Hypotheses};
 use super::{KINDS, Rig, like, of_kind};
 use recordings::DataError;
 use units::convert;
+
+/// The equations of a description once they were asked for; clones share them.
+#[derive(Clone, Default)]
+pub(super) struct Made(Arc<OnceLock<&'static dyn Rig>>);
+
+/// They follow from the rest of the description.
+impl PartialEq for Made {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl fmt::Debug for Made {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Made")
+            .field(&self.0.get().map(|rig| rig.kind()))
+            .finish()
+    }
+}
 
 /// A set of measurements of one rig.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -48,6 +69,8 @@ pub struct Description {
     /// Where its hypotheses do, if not in the description.
     #[serde(skip)]
     pub hypotheses_path: Option<PathBuf>,
+    #[serde(skip)]
+    pub(super) made: Made,
 }
 
 /// A column of the data.
@@ -262,6 +285,7 @@ impl Description {
             }
         }
         self.hypotheses_path = Some(effects.to_owned());
+        self.made = Made::default();
         self.rig()?;
         Ok(self)
     }
@@ -271,8 +295,12 @@ impl Description {
     /// # Errors
     /// An unknown kind; an effect that does not fit it.
     pub fn rig(&self) -> Result<&'static dyn Rig, DescriptionError> {
+        if let Some(rig) = self.made.0.get() {
+            return Ok(*rig);
+        }
         let path = self.hypotheses_path.as_deref().unwrap_or(&self.path);
-        hypotheses::extended(self.base()?, &self.hypotheses, path)
+        let rig = hypotheses::extended(self.base()?, &self.hypotheses, path)?;
+        Ok(*self.made.0.get_or_init(|| rig))
     }
 
     fn base(&self) -> Result<&'static dyn Rig, DescriptionError> {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::description::{
-    Column, Description, DescriptionError, LeftOut, Quantity, Windows, listed,
+    Column, Description, DescriptionError, LeftOut, Made, Quantity, Windows, listed,
 };
 use super::diagnosis::RigDiagnosis;
 use super::hypotheses::Hypotheses;
@@ -54,6 +54,8 @@ pub struct ExtendedRig {
     /// Where it stands.
     #[serde(skip)]
     pub path: PathBuf,
+    #[serde(skip)]
+    made: Made,
 }
 
 /// Errors `||y - m|| / ||m - mean||` of one file, of which only what a file has for itself was fitted,
@@ -183,6 +185,7 @@ impl ExtendedRig {
             },
             session,
             path: PathBuf::new(),
+            made: Made::default(),
         })
     }
 
@@ -213,6 +216,7 @@ impl ExtendedRig {
             hypotheses: description.hypotheses.clone(),
             session: BTreeMap::new(),
             path: description.path.clone(),
+            made: description.made.clone(),
         })
     }
 
@@ -278,6 +282,7 @@ impl ExtendedRig {
             hypotheses_path: None,
             transfer_function: None,
             path: self.path.clone(),
+            made: self.made.clone(),
         }
     }
 

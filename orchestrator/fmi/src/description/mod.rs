@@ -340,7 +340,7 @@ pub(super) fn read(
     let mut description = match root.attribute("fmiVersion") {
         None => {
             return Err(wrong(
-                "the attribute fmiVersion is missing, expected \"2.0\" or \"3.0\"".to_string(),
+                "the attribute fmiVersion is missing; expected \"2.0\" or \"3.0\"".to_string(),
             ));
         }
         Some("2.0") => fmi2::read(&text, root, exchange).map_err(refused)?,

@@ -606,8 +606,7 @@ impl Commissioned {
         let recordings = self.recordings.iter();
         files.extend(recordings.map(|own| format!("{RECORDINGS}/{}.csv", own.name).into()));
         self.files = files;
-        let page = report::render(&page::report(self), &folder.join(report::FILE))?;
-        results.write_text(report::FILE, &page)?;
+        results.write_page(report::FILE, &page::report(self))?;
         results.write_json("commission.json", self)?;
         results.finish()?;
         Ok(())

@@ -20,9 +20,8 @@ pub const COMPARISON: &str = "comparison.json";
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(comparison: &Comparison, folder: &Out) -> Result<Vec<PathBuf>, Error> {
-    let page = report::render(&page(comparison), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, &page(comparison))?;
     results.write_text(COMPARISON, &serde_json::json!(comparison).to_string())?;
     results.write_text(errors::FILE, &errors::written(&comparison.rows))?;
     Ok(results.finish()?)

@@ -28,7 +28,7 @@ use crate::error::Error;
 use crate::json;
 use crate::results::{Out, Results};
 use pack::Installation;
-use pages::report::{self, Report};
+use pages::report::{self, Report, UnitSystem};
 
 /// File with the extended model, in the folder of `--out`.
 pub const EXTENDED_MODEL: &str = "extended_model.toml";
@@ -145,7 +145,7 @@ fn of_subject(
                 (folder, installation),
             )?;
             report.wall_s = begun.elapsed().as_secs_f64();
-            page::of_case(subject, &report, case, found, &extended)
+            page::of_case(subject, &report, case, found, &extended, folder.units())
         }
         Diagnosis::Rig {
             description,
@@ -154,11 +154,10 @@ fn of_subject(
         } => {
             let curves = rig::extend(description, measurement, found, &mut results, folder)?;
             report.wall_s = begun.elapsed().as_secs_f64();
-            page::of_rig(&found.name, subject, &report, &curves)
+            page::of_rig(&found.name, subject, &report, &curves, folder.units())
         }
     };
-    let page = report::render(&page, &folder.join(report::FILE))?;
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, &page)?;
     results.write_text(DIAGNOSIS, &format!("{:#}\n", serde_json::json!(report)))?;
     results.finish()?;
     Ok(report)
@@ -242,7 +241,7 @@ fn fault(subject: &Path, error: DiagnosisError) -> Error {
 ///
 /// # Errors
 /// A file that cannot be read or is none of a diagnosis; a report with pictures that would be lost.
-pub fn page_again(folder: &Path) -> Result<Report, Error> {
+pub fn page_again(folder: &Path, units: UnitSystem) -> Result<Report, Error> {
     let path = folder.join(DIAGNOSIS);
     let found: DiagnosisReport = json::read(&path, "the JSON of a diagnosis")?;
     let curves = match &found.evidence {
@@ -256,5 +255,5 @@ pub fn page_again(folder: &Path) -> Result<Report, Error> {
              without them, or run `shakebench diagnose` again",
         ));
     }
-    Ok(page::again(folder, &found, curves.as_deref()))
+    Ok(page::again(folder, &found, curves.as_deref(), units))
 }

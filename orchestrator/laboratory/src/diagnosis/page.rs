@@ -14,7 +14,9 @@ use super::case::Extended;
 use super::{DIAGNOSIS, pictures, rig, text};
 use pack::extended_model::ExtendedModel;
 use pages::report::number::significant;
-use pages::report::{Bar, BarGroup, Bars, Cell, Fact, Panel, Report, Section, Table, identity};
+use pages::report::{
+    Bar, BarGroup, Bars, Cell, Fact, Panel, Report, Section, Table, UnitSystem, identity,
+};
 use plant::identified::nominal::{shake_table_values, specimen_values};
 
 /// A table of `rows`, of which the first are the headings.
@@ -40,8 +42,9 @@ pub(super) fn of_case(
     case: &Case,
     found: &Diagnosis,
     extended: &Extended,
+    units: UnitSystem,
 ) -> Report {
-    let mut sections = vec![findings(report), gain(report, Some(found))];
+    let mut sections = vec![findings(report, units), gain(report, Some(found))];
     if let Some(played) = &extended.comparison {
         sections.push(Section {
             panels: pictures::overlays(case, played)
@@ -67,8 +70,9 @@ pub(super) fn of_rig(
     place: &Path,
     report: &DiagnosisReport,
     curves: &[Curves],
+    units: UnitSystem,
 ) -> Report {
-    let sections = rig_sections(report, Some(curves));
+    let sections = rig_sections(report, Some(curves), units);
     page(name, &place.display().to_string(), report, sections)
 }
 
@@ -78,8 +82,9 @@ pub(super) fn of_foreign(
     place: &Path,
     report: &DiagnosisReport,
     panels: Vec<Panel>,
+    units: UnitSystem,
 ) -> Report {
-    let mut sections = rig_sections(report, None);
+    let mut sections = rig_sections(report, None, units);
     let pictures = Section {
         heading: "Measured and simulated".into(),
         text: vec!["The first record that contains held-out data.".into()],
@@ -91,12 +96,17 @@ pub(super) fn of_foreign(
 }
 
 /// The report of what `diagnosis.json` in `folder` tells, with pictures of `curves`.
-pub(super) fn again(folder: &Path, report: &DiagnosisReport, curves: Option<&[Curves]>) -> Report {
+pub(super) fn again(
+    folder: &Path,
+    report: &DiagnosisReport,
+    curves: Option<&[Curves]>,
+    units: UnitSystem,
+) -> Report {
     let source = format!("{DIAGNOSIS} in {}", folder.display());
     let sections = match &report.evidence {
-        Evidence::Rig(_) => rig_sections(report, curves),
+        Evidence::Rig(_) => rig_sections(report, curves, units),
         Evidence::ShakeTable(evidence) => {
-            let mut sections = vec![findings(report), gain(report, None)];
+            let mut sections = vec![findings(report, units), gain(report, None)];
             sections.extend(evidence.co_simulation.as_ref().map(closed_loop));
             sections.push(relations(evidence));
             sections.push(Section {
@@ -118,13 +128,17 @@ pub(super) fn again(folder: &Path, report: &DiagnosisReport, curves: Option<&[Cu
     page(name, &source, report, sections)
 }
 
-fn rig_sections(report: &DiagnosisReport, curves: Option<&[Curves]>) -> Vec<Section> {
+fn rig_sections(
+    report: &DiagnosisReport,
+    curves: Option<&[Curves]>,
+    units: UnitSystem,
+) -> Vec<Section> {
     let Evidence::Rig(evidence) = &report.evidence else {
         return Vec::new();
     };
     let rig = &evidence.rig;
     let mut sections = vec![
-        findings(report),
+        findings(report, units),
         Section {
             heading: "What it brings".into(),
             text: vec![format!(
@@ -236,12 +250,12 @@ fn facts(report: &DiagnosisReport) -> Vec<Fact> {
     facts
 }
 
-fn findings(report: &DiagnosisReport) -> Section {
+fn findings(report: &DiagnosisReport, units: UnitSystem) -> Section {
     let mut tables = Vec::new();
     if !report.effects.is_empty() {
         tables.push(Table::headed(
             "Estimates ± half of their 95 % interval",
-            text::parameters(report),
+            text::parameters(report, units),
         ));
     }
     let notes = text::remarks(report);

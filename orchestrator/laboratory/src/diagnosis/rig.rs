@@ -14,7 +14,7 @@ use identification::diagnosis::rigs::{
 use super::{EXTENDED_MODEL, fault, file_fault};
 use crate::error::Error;
 use crate::results::Results;
-use pages::report::{Abscissa, Axis, Panel, Series, Style, Units, svg};
+use pages::report::{Abscissa, Axis, Panel, Series, Style, Units};
 
 /// File with measured and simulated output.
 const CURVES: &str = "curves.csv";
@@ -48,7 +48,7 @@ pub(super) fn extend(
         curves::write(&curves, rig.inputs()[0], rig.output(), file).map_err(io::Error::other)
     })?;
     for (name, panel) in PICTURES.into_iter().zip(pictures(found, &curves)) {
-        results.write_text(name, &svg(&panel))?;
+        results.write_picture(name, &panel)?;
     }
     Ok(curves)
 }

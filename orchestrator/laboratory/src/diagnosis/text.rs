@@ -60,7 +60,7 @@ fn interval(parameter: &ParameterReport, unit: &str, is_only: bool) -> String {
 
 /// Estimates with a line of headings. For the shake table the units of its laboratory are shown
 /// next to SI.
-pub(super) fn parameters(report: &DiagnosisReport) -> Vec<Vec<String>> {
+pub(super) fn parameters(report: &DiagnosisReport, units: UnitSystem) -> Vec<Vec<String>> {
     let is_case = matches!(report.evidence, Evidence::ShakeTable(_));
     let mut heading = vec!["effect", "parameter"];
     heading.extend(is_case.then_some("laboratory"));
@@ -77,7 +77,7 @@ pub(super) fn parameters(report: &DiagnosisReport) -> Vec<Vec<String>> {
             let mut row = vec![effect.effect.clone(), name.to_string()];
             row.extend(is_case.then(|| cell(&|si| laboratory_unit(si).to_string())));
             row.push(cell(&str::to_string));
-            let laboratory = |si: &str| match is_case && UnitSystem::of_text() == UnitSystem::Us {
+            let laboratory = |si: &str| match is_case && units == UnitSystem::Us {
                 true => laboratory_unit(si).to_string(),
                 false => si.to_string(),
             };
@@ -278,10 +278,10 @@ pub(super) fn parts(rig: &RigDiagnosis) -> Vec<Vec<String>> {
 }
 
 /// What is printed without `--json`.
-pub fn text(report: &DiagnosisReport) -> String {
+pub fn text(report: &DiagnosisReport, units: UnitSystem) -> String {
     let mut text = format!("{}\n", report.sentence);
     if !report.effects.is_empty() {
-        text += &format!("\n{}", aligned(&parameters(report)));
+        text += &format!("\n{}", aligned(&parameters(report, units)));
     }
     match &report.evidence {
         Evidence::ShakeTable(evidence) => {

@@ -115,13 +115,12 @@ pub fn write(figures: &[Figure], motion: &str, folder: &Out) -> Result<Vec<PathB
         sections: sections.collect(),
         ..Report::default()
     };
-    let page = report::render(&page, &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, &page)?;
     for figure in figures {
         for (n, panel) in figure.panels.iter().enumerate() {
             let name = format!("figure-{}-{}.svg", figure.number, n + 1);
-            results.write_text(&name, &report::svg(panel))?;
+            results.write_picture(&name, panel)?;
         }
     }
     Ok(results.finish()?)

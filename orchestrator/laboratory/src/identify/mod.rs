@@ -10,7 +10,7 @@ mod residuals;
 mod responses;
 mod summary;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use identification::IdentificationError;
@@ -29,7 +29,7 @@ pub use summary::Summary;
 
 use crate::error::Error;
 use crate::results::{Out, Results};
-use pages::report::{self, Report};
+use pages::report::Report;
 
 /// What is identified from what.
 #[derive(Debug, Clone)]
@@ -93,16 +93,16 @@ impl Outcome {
         }
     }
 
-    /// Writes model and report next to each other, both or none; files that differ are replaced if `replaces`.
+    /// Writes the model to `out` and its report next to it, both or none.
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write(&self, replaces: bool) -> Result<(), Error> {
+    pub fn write(&self, out: &Out) -> Result<(), Error> {
         match self {
-            Self::Rig(own) => own.write(replaces),
+            Self::Rig(own) => own.write(out),
             Self::OneInput(own) => {
                 let page = own.own.report(&own.summary);
-                write(&own.summary, &own.own.text, &page, replaces)
+                write(&own.own.text, &page, out)
             }
         }
     }
@@ -259,35 +259,30 @@ impl Identified {
         })
     }
 
-    /// Writes model and report next to each other, both or none; files that differ are replaced if `replaces`.
+    /// Writes the model to `out` and its report next to it, both or none.
     ///
     /// # Errors
     /// A folder that cannot be written.
-    pub fn write(&self, replaces: bool) -> Result<(), Error> {
+    pub fn write(&self, out: &Out) -> Result<(), Error> {
         let page = match &self.form {
             Form::General(found) => page::report(found, &self.recordings, &self.summary),
             Form::Hydraulic(own) => own.report(&self.summary),
         };
-        write(
-            &self.summary,
-            &self.model_file()?.to_toml()?,
-            &page,
-            replaces,
-        )
+        write(&self.model_file()?.to_toml()?, &page, out)
     }
 }
 
 /// Writes a model and its report next to each other, both or none.
-fn write(summary: &Summary, model: &str, page: &Report, replaces: bool) -> Result<(), Error> {
-    let path = &summary.model;
-    let beside = path.with_extension("html");
-    let page = report::render(page, &beside)?;
-    let out = Out::new(path).replacing(replaces);
+fn write(model: &str, page: &Report, out: &Out) -> Result<(), Error> {
+    let name = |file: &Path| {
+        file.file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    };
     let mut results = Results::begin(&out.folder())?;
-    for (file, text) in [(path.as_path(), model), (&beside, &page)] {
-        let name = file.file_name().unwrap_or_default();
-        results.write_text(&name.to_string_lossy(), text)?;
-    }
+    results.write_text(&name(out), model)?;
+    results.write_page(&name(&out.with_extension("html")), page)?;
     results.finish()?;
     Ok(())
 }

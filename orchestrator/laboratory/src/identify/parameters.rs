@@ -49,9 +49,9 @@ pub enum Uncertainty {
 impl Parameter {
     /// Name, value, standard error and unit, in the units that were asked for, else the model file's.
     #[must_use]
-    pub fn text(&self) -> [String; 4] {
+    pub fn text(&self, asked: Option<UnitSystem>) -> [String; 4] {
         let units = self.units();
-        let (factor, unit) = match UnitSystem::chosen() {
+        let (factor, unit) = match asked {
             Some(system) => units.unit(system),
             None => (1.0, self.unit),
         };

@@ -23,9 +23,8 @@ const DRIVE_Y: &str = "drive_y.csv";
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(plan: &Plan, iteration: &Iteration, folder: &Out) -> Result<Vec<PathBuf>, Error> {
-    let page = report::render(&page(plan, iteration), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, &page(plan, iteration))?;
     results.write_text(
         ITERATION,
         &(serde_json::json!(iteration).to_string() + "\n"),

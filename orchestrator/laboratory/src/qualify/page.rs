@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use motion::{Motion, Record};
 use pages::report::identity::{entry, version};
 use pages::report::{
-    self, Abscissa, Axis, Cell, Fact, Panel, Report, Section, Series, Style, Table, Units, svg,
+    self, Abscissa, Axis, Cell, Fact, Panel, Report, Section, Series, Style, Table, Units,
 };
 use qualification::resonance::{Found, Resonance};
 use qualification::{Rule, Verdict, grid};
@@ -71,20 +71,19 @@ fn record_text(acceleration: &[f64], dt: f64) -> String {
 /// # Errors
 /// A folder that cannot be written.
 pub fn write(plan: &Plan, found: &Qualification, folder: &Out) -> Result<Vec<PathBuf>, Error> {
-    let page = report::render(&page(plan, found), &folder.join(report::FILE))?;
     let mut results = Results::begin(folder)?;
     for (n, motion) in found.motions.iter().enumerate() {
         results.write_text(&motion_name(n, "csv"), &drive_text(motion))?;
         results.write_text(&motion_name(n, "AT2"), &motion_at2(motion))?;
     }
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, &page(plan, found))?;
     results.write_text(JSON, &(serde_json::json!(found).to_string() + "\n"))?;
     let rule = plan.rule.at_level(found.level);
     if let Some(best) = &found.best {
         let acceleration = shown(found);
-        results.write_text(
+        results.write_picture(
             PICTURE,
-            &svg(&spectrum_panel(&rule, acceleration, found.motions[0].dt)),
+            &spectrum_panel(&rule, acceleration, found.motions[0].dt),
         )?;
         results.write_text(POINTS, &points_text(best))?;
     }

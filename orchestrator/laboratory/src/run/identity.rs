@@ -12,7 +12,7 @@ use pages::report::{Cell, Changed, UnitSystem, Units};
 use units::STANDARD_GRAVITY;
 
 /// The entries of a page.
-pub fn of_run(manifest: &Manifest, summary: &Summary) -> Vec<(String, Cell)> {
+pub fn of_run(manifest: &Manifest, summary: &Summary, units: UnitSystem) -> Vec<(String, Cell)> {
     let request = &manifest.request;
     let mut entries = vec![entry("System", request.system.as_str())];
     if !is_file(&request.system) {
@@ -50,7 +50,7 @@ pub fn of_run(manifest: &Manifest, summary: &Summary) -> Vec<(String, Cell)> {
                     manifest.components.get(name)?.parameters.get(variable)
                 });
             let unit = parameter.and_then(|(_, unit)| unit.as_deref());
-            in_words(change, unit.unwrap_or_default())
+            in_words(change, unit.unwrap_or_default(), units)
         });
         let changes: Vec<String> = changes.collect();
         entries.push(entry("Changed during the run", changes.join("; ")));

@@ -14,6 +14,7 @@ use fmi_import::{Causality, hexadecimal};
 use fmi_master::{Algorithm, Change};
 use fmi_system::{Link, System};
 use motion::Motion;
+use pages::report::UnitSystem;
 
 /// `manifest.json` of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -192,7 +193,9 @@ impl Manifest {
         let changes = |own: &Self| match own.changes.as_slice() {
             [] => "none".to_string(),
             all => {
-                let all = all.iter().map(|change| in_words(change, ""));
+                let all = all
+                    .iter()
+                    .map(|change| in_words(change, "", UnitSystem::default()));
                 all.collect::<Vec<_>>().join("; ")
             }
         };

@@ -22,7 +22,7 @@ use fmi_import::hexadecimal;
 use fmi_master::{Outcome, Record};
 use motion::Motion;
 use pages::report::number::significant;
-use pages::report::{self, Cell, Component, Report, SpecimenHistory};
+use pages::report::{self, Cell, Component, Report, SpecimenHistory, UnitSystem};
 
 /// Writes the files of a run and says where they are; the signals as Parquet too where that is asked for.
 ///
@@ -59,9 +59,8 @@ pub fn write(
     results.write_json("summary.json", summary)?;
     results.write_json("manifest.json", manifest)?;
     let motion = &prepared.motion;
-    if let Some(page) = page(summary, manifest, motion, &outcome.record) {
-        let page = report::render(&page, &folder.join(report::FILE))?;
-        results.write_text(report::FILE, &page)?;
+    if let Some(page) = page(summary, manifest, motion, &outcome.record, folder.units()) {
+        results.write_page(report::FILE, &page)?;
     }
     Ok(results.finish()?)
 }
@@ -90,6 +89,7 @@ fn page(
     manifest: &Manifest,
     motion: &Motion,
     record: &Record,
+    units: UnitSystem,
 ) -> Option<Report> {
     let names = manifest.components.keys().map(String::as_str);
     let both = axes::tables(names, &manifest.connections, record);
@@ -105,6 +105,7 @@ fn page(
                 &tables[n],
                 motions[n],
                 &histories[n],
+                units,
             );
             report::AxisRun {
                 name: axes::NAMES[n],
@@ -124,7 +125,7 @@ fn page(
     let asked = asked(record, motion);
     let motion = asked.as_ref().unwrap_or(motion);
     let histories = histories(record, &table);
-    let run = run_of(summary, manifest, record, &table, motion, &histories);
+    let run = run_of(summary, manifest, record, &table, motion, &histories, units);
     Some(report::run(&run))
 }
 
@@ -142,6 +143,7 @@ fn run_of<'a>(
     table: &Table<'_>,
     motion: &'a Motion,
     [displacement, velocity, acceleration]: &'a [Vec<f64>; 3],
+    units: UnitSystem,
 ) -> report::Run<'a> {
     let row = |name: &str, value: String| (name.to_string(), Cell::from(value));
     let settings = vec![
@@ -169,7 +171,7 @@ fn run_of<'a>(
     });
     report::Run {
         system: &summary.system,
-        identity: identity::of_run(manifest, summary),
+        identity: identity::of_run(manifest, summary, units),
         motion,
         duration: summary.motion.duration_s,
         displacement,
@@ -242,7 +244,7 @@ fn components(manifest: &Manifest, summary: &Summary) -> Vec<Component> {
 ///
 /// # Errors
 /// A file that is missing or is none of a run.
-pub fn page_again(folder: &Path) -> Result<Report, Error> {
+pub fn page_again(folder: &Path, units: UnitSystem) -> Result<Report, Error> {
     let manifest = Manifest::read(&folder.join("manifest.json"))?;
     let summary = Summary::read(&folder.join("summary.json"))?;
     let place = folder.join(RESULTS);
@@ -270,7 +272,7 @@ pub fn page_again(folder: &Path) -> Result<Report, Error> {
     if let Some(across) = &manifest.motion.across {
         motion.across = Some(Box::new(played(across, "_y")?));
     }
-    page(&summary, &manifest, &motion, &record).ok_or_else(|| Error::File {
+    page(&summary, &manifest, &motion, &record, units).ok_or_else(|| Error::File {
         path: folder.to_path_buf(),
         reason: "no component of the run is a table with displacement, velocity and acceleration, \
                  which a report needs"

@@ -29,8 +29,8 @@ pub(super) fn steps_in_words(summary: &Summary) -> String {
     }
 }
 
-/// The figures of a run as tables for people, in the units of the terminal.
-pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
+/// The figures of a run as tables for people.
+pub fn text(summary: &Summary, record: &Record, motion: &Motion, system: UnitSystem) -> String {
     let mut text = match motion.is_empty() {
         true => format!("{}\n", summary.system),
         false => format!("{} on {}\n", summary.system, summary.motion.name),
@@ -88,7 +88,7 @@ pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
     }
     if let Some(both) = axes::motions(motion).filter(|_| !summary.axes.is_empty()) {
         for (axis, motion) in summary.axes.iter().zip(both) {
-            text += &along(axis, motion, record.len());
+            text += &along(axis, motion, record.len(), system);
         }
         return text;
     }
@@ -100,18 +100,17 @@ pub fn text(summary: &Summary, record: &Record, motion: &Motion) -> String {
         Some(asked) => (asked, "structure"),
         None => (motion, "reference"),
     };
-    text + &followed(tracking, motion, heading, record.len())
+    text + &followed(tracking, motion, heading, record.len(), system)
 }
 
 /// How an axis followed its motion, or moved while it was to rest.
-fn along(axis: &Axis, motion: &Motion, played: usize) -> String {
+fn along(axis: &Axis, motion: &Motion, played: usize, system: UnitSystem) -> String {
     let mut text = format!("along {}: {}\n\n", axis.axis, axis.motion.name);
     if let Some(tracking) = &axis.tracking {
-        text += &followed(tracking, motion, "reference", played);
+        text += &followed(tracking, motion, "reference", played, system);
         text += "\n";
     }
     if let Some(cross) = &axis.at_rest {
-        let system = UnitSystem::of_text();
         let pair = |name: &str, percent: f64, peak, units| {
             let cells = [
                 format!("{percent:.4} %"),
@@ -144,7 +143,13 @@ fn along(axis: &Axis, motion: &Motion, played: usize) -> String {
 }
 
 /// Peaks and errors of a table that followed `motion`, of which so many samples were played.
-fn followed(tracking: &Tracking, motion: &Motion, heading: &str, samples: usize) -> String {
+fn followed(
+    tracking: &Tracking,
+    motion: &Motion,
+    heading: &str,
+    samples: usize,
+    system: UnitSystem,
+) -> String {
     let mut text = String::new();
     let played = samples.min(motion.len());
     let row = |name: &str, cells: [String; 3]| {
@@ -152,7 +157,6 @@ fn followed(tracking: &Tracking, motion: &Motion, heading: &str, samples: usize)
         row.extend(cells);
         row
     };
-    let system = UnitSystem::of_text();
     let length = |value| Cell::Quantity(value, Units::DISPLACEMENT, 4).text(system);
     let acceleration = |value| Cell::Quantity(value, Units::ACCELERATION, 4).text(system);
     let percent = |value: f64| format!("{value:.4} %");

@@ -201,12 +201,12 @@ fn not_tunable(system: &System, name: &str) -> String {
     }
 }
 
-/// A change in words, in the units of text.
+/// A change in words.
 #[must_use]
-pub fn in_words(change: &Change, unit: &str) -> String {
+pub fn in_words(change: &Change, unit: &str, system: UnitSystem) -> String {
     let units = Units::of(unit);
-    let (from, name) = units.shown(change.from, UnitSystem::of_text());
-    let (to, _) = units.shown(change.to, UnitSystem::of_text());
+    let (from, name) = units.shown(change.from, system);
+    let (to, _) = units.shown(change.to, system);
     let unit = match name {
         "" => String::new(),
         name => format!(" {name}"),

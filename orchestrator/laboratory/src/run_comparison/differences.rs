@@ -20,7 +20,7 @@ pub struct Difference {
 
 /// All differences: settings first, then parameters of components that are of the same model in every run; those of
 /// others have nothing to be compared with.
-pub(super) fn of(manifests: &[&Manifest]) -> Vec<Difference> {
+pub(super) fn of(manifests: &[&Manifest], units: UnitSystem) -> Vec<Difference> {
     let mut found = Vec::new();
     let mut compare = |what: &str, value: &dyn Fn(&Manifest) -> String| {
         let values: Vec<String> = manifests.iter().map(|one| value(one)).collect();
@@ -68,8 +68,8 @@ pub(super) fn of(manifests: &[&Manifest]) -> Vec<Difference> {
                 let component = m.components.get(name);
                 let value = component.and_then(|c| c.parameters.get(parameter));
                 value.map_or("-".into(), |(value, unit)| {
-                    let units = Units::of(unit.as_deref().unwrap_or_default());
-                    cell(value, &units).text(UnitSystem::of_text())
+                    let both = Units::of(unit.as_deref().unwrap_or_default());
+                    cell(value, &both).text(units)
                 })
             });
         }

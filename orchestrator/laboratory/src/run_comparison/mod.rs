@@ -16,7 +16,7 @@ use crate::run::signals::{RESULTS, read_csv};
 use crate::run::summary::Summary;
 use fmi_master::{Ending, Record};
 use motion::metrics::Tracking;
-use pages::report;
+use pages::report::{self, UnitSystem};
 
 /// File with the figures and the differences.
 pub const RUNS: &str = "runs.json";
@@ -57,11 +57,11 @@ struct Files {
     record: Record,
 }
 
-/// Reads runs; a folder without a run stands for the runs in the folders below it.
+/// Reads runs, with differences in these units; a folder without a run stands for the runs in the folders below it.
 ///
 /// # Errors
 /// A folder that holds no run, a file of one at fault, fewer than two runs.
-pub fn read(folders: &[PathBuf]) -> Result<RunComparison, Error> {
+pub fn read(folders: &[PathBuf], units: UnitSystem) -> Result<RunComparison, Error> {
     let places = find(folders)?;
     let runs: Result<Vec<ComparedRun>, Error> =
         places.iter().map(|place| read_one(place)).collect();
@@ -76,7 +76,7 @@ pub fn read(folders: &[PathBuf]) -> Result<RunComparison, Error> {
     }
     name(&mut runs);
     let manifests: Vec<&Manifest> = runs.iter().map(|run| &run.files.manifest).collect();
-    let differences = differences::of(&manifests);
+    let differences = differences::of(&manifests, units);
     Ok(RunComparison { runs, differences })
 }
 
@@ -162,9 +162,8 @@ impl RunComparison {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self, folder: &Out) -> Result<Vec<PathBuf>, Error> {
-        let page = report::render(&page::report(self), &folder.join(report::FILE))?;
         let mut results = Results::begin(folder)?;
-        results.write_text(report::FILE, &page)?;
+        results.write_page(report::FILE, &page::report(self))?;
         results.write_text(RUNS, &format!("{:#}\n", serde_json::json!(self)))?;
         results.write("runs.csv", |file| {
             let mut csv = csv::Writer::from_writer(file);
@@ -200,13 +199,10 @@ impl RunComparison {
     }
 
     /// The figures, one row per run with a line of headings.
-    pub fn figures(&self) -> Vec<Vec<String>> {
+    pub fn figures(&self, system: UnitSystem) -> Vec<Vec<String>> {
         page::figures(self)
             .iter()
-            .map(|row| {
-                let system = report::UnitSystem::of_text();
-                row.iter().map(|cell| cell.text(system)).collect()
-            })
+            .map(|row| row.iter().map(|cell| cell.text(system)).collect())
             .collect()
     }
 }

@@ -28,12 +28,17 @@ pub struct Watched {
 
 impl Watched {
     /// Serves the page of `system`, an element with so many degrees of freedom, at a port of 127.0.0.1,
-    /// any free one for 0.
+    /// any free one for 0, in these units.
     ///
     /// # Errors
     /// A port that is taken.
-    pub fn start(system: &str, degrees_of_freedom: usize, port: u16) -> Result<Self, Error> {
-        let scene = scene(system, degrees_of_freedom);
+    pub fn start(
+        system: &str,
+        degrees_of_freedom: usize,
+        port: u16,
+        units: UnitSystem,
+    ) -> Result<Self, Error> {
+        let scene = scene(system, degrees_of_freedom, units);
         let signals = HEAD - 1 + 3 * degrees_of_freedom;
         let tap = Arc::new(Tap::new((0..signals).collect(), ROWS));
         let server =
@@ -88,7 +93,7 @@ impl Watched {
 }
 
 /// The plots of an element with so many degrees of freedom.
-fn scene(system: &str, degrees_of_freedom: usize) -> Scene {
+fn scene(system: &str, degrees_of_freedom: usize, reader: UnitSystem) -> Scene {
     let names = |what: &str, group: usize| -> Vec<(String, usize)> {
         let own = (0..degrees_of_freedom).map(|i| {
             let number = match degrees_of_freedom {
@@ -101,7 +106,7 @@ fn scene(system: &str, degrees_of_freedom: usize) -> Scene {
         own.collect()
     };
     let units = |units: Units| {
-        let (factor, unit) = units.unit(UnitSystem::of_text());
+        let (factor, unit) = units.unit(reader);
         (unit.to_string(), factor)
     };
     let plot = |title: &str, unit: (String, f64), signals: Vec<(String, usize)>| Plot {
@@ -142,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_row_holds_step_trials_round_trip_and_every_degree_of_freedom() {
-        let mut watched = Watched::start("frame", 2, 0).unwrap();
+        let mut watched = Watched::start("frame", 2, 0, UnitSystem::Us).unwrap();
         let trial = Trial {
             displacement: vec![0.5, -0.25],
             ..Trial::default()
@@ -173,7 +178,7 @@ mod tests {
         watched.step(&step);
         assert_eq!(watched.tap.rows(1, 9)[0][3], 0.5);
         // The scene names the columns of that row.
-        let scene = scene("frame", 2);
+        let scene = scene("frame", 2, UnitSystem::Us);
         let column = |plot: usize, n: usize| {
             let (name, column) = &scene.plots[plot].signals[n];
             (name.as_str(), row[*column])

@@ -23,7 +23,7 @@ pub(super) enum TuningError {
     #[error(transparent)]
     Rule(#[from] UnknownRule),
     /// A model for parameters that are printed.
-    #[error("printed parameters do not use `--control-model`; expected one of the two")]
+    #[error("printed parameters do not use `--control-model`; omit one of the two")]
     Printed,
     /// A plant that nobody has commissioned.
     #[error(

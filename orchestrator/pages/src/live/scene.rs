@@ -92,16 +92,15 @@ pub struct Run<'a> {
 
 impl Scene {
     /// Of a run whose simulation has the signals `names`; also their places among them, in the
-    /// order of the columns after the time.
+    /// order of the columns after the time. Plots are in the units of `system`.
     #[must_use]
-    pub fn new(run: Run<'_>, names: &[String]) -> (Self, Vec<usize>) {
+    pub fn new(run: Run<'_>, names: &[String], system: UnitSystem) -> (Self, Vec<usize>) {
         let mut places = Vec::new();
         let mut column = |name: &str| {
             let place = names.iter().position(|own| own == name)?;
             places.push(place);
             Some(places.len())
         };
-        let system = UnitSystem::of_text();
         let mut plots = Vec::new();
         for (title, units, signals, limits) in WANTED {
             let signals: Vec<(String, usize)> = signals

@@ -311,6 +311,7 @@ fn reply(mut stream: &TcpStream, status: &str, kind: &str, body: &str) -> io::Re
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::UnitSystem;
     use fmi_master::{Panel, Tunable};
     use fmi_system::System;
 
@@ -461,7 +462,7 @@ mod tests {
             notes: Vec::new(),
             stop: None,
         };
-        let tuning = Tuning::new(&none, Arc::clone(&panel), 1.0);
+        let tuning = Tuning::new(&none, Arc::clone(&panel), 1.0, UnitSystem::Us);
         let tap = Arc::new(Tap::new(vec![0], 3));
         let server = Server::start(&scene(), tap, Some(tuning), 0).unwrap();
         let host = server.address;

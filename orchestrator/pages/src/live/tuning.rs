@@ -38,18 +38,18 @@ struct Wish {
 }
 
 impl Tuning {
-    /// The parameters of `panel` in a run of `system`; a change takes so many seconds.
+    /// The parameters of `panel` in a run of `system`, in the units of `reader`; a change takes so many seconds.
     #[must_use]
-    pub fn new(system: &System, panel: Arc<Panel>, seconds: f64) -> Self {
+    pub fn new(system: &System, panel: Arc<Panel>, seconds: f64, reader: UnitSystem) -> Self {
         let knobs = panel.tunables().iter().map(|own| {
             let found = system.variable(&own.variable);
             let found = found.map(|(component, at)| &component.fmu.description.variables[at]);
             let unit = found.and_then(|variable| variable.unit.as_deref());
             let unit = unit.unwrap_or_default();
             let units = Units::of(unit);
-            let (mut factor, mut shown) = units.unit(UnitSystem::of_text());
+            let (mut factor, mut shown) = units.unit(reader);
             let laboratory = found.and_then(|variable| variable.display_unit.as_deref());
-            if let (UnitSystem::Us, Some(own)) = (UnitSystem::of_text(), laboratory)
+            if let (UnitSystem::Us, Some(own)) = (reader, laboratory)
                 && let Ok(one) = units::convert(1.0, own, unit)
             {
                 (factor, shown) = (one, own);

@@ -20,11 +20,12 @@ const UPLOT_LICENSE: &str = include_str!("assets/uPlot.LICENSE");
 /// Letters of a cell that fits in one line.
 const WORD: usize = 10;
 
-/// Renders the report. All text is escaped; the file refers to nothing outside itself.
+/// Renders the report in the units that were asked for; none: in the laboratory's, with buttons to switch. All text
+/// is escaped; the file refers to nothing outside itself.
 ///
 /// # Errors
 /// Only a fault of the template itself.
-pub fn html(report: &Report) -> Result<String, minijinja::Error> {
+pub fn html(report: &Report, units: Option<UnitSystem>) -> Result<String, minijinja::Error> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     let mut syntax = SyntaxConfig::builder();
@@ -54,8 +55,8 @@ pub fn html(report: &Report) -> Result<String, minijinja::Error> {
         facts,
         identity,
         sections,
-        units => UnitSystem::of_text().key(),
-        units_asked => UnitSystem::chosen().is_some(),
+        units => units.unwrap_or_default().key(),
+        units_asked => units.is_some(),
         has_panels => next_panel > 0,
         data => json_for_script(panels),
         style => STYLE,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Report, html};
+use super::{Report, UnitSystem, html};
 
 /// File with the report of a command.
 pub const FILE: &str = "report.html";
@@ -17,12 +17,16 @@ pub struct PageError {
     source: minijinja::Error,
 }
 
-/// The text of the page that becomes the file `path`.
+/// The text of the page that becomes the file `path`, as [`html`].
 ///
 /// # Errors
 /// Only a fault of the template itself, by that file.
-pub fn render(report: &Report, path: &Path) -> Result<String, PageError> {
-    html(report).map_err(|source| PageError {
+pub fn render(
+    report: &Report,
+    units: Option<UnitSystem>,
+    path: &Path,
+) -> Result<String, PageError> {
+    html(report, units).map_err(|source| PageError {
         path: path.to_path_buf(),
         source,
     })

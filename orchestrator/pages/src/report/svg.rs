@@ -18,18 +18,17 @@ const COLOURS: [&str; 9] = [
     "#6f7f1e",
 ];
 
-/// Draws the panel in the units that were chosen, else the laboratory's, on white. All text is
-/// escaped.
+/// Draws the panel in a system of units, on white. All text is escaped.
 #[must_use]
-pub fn svg(panel: &Panel) -> String {
+pub fn svg(panel: &Panel, system: UnitSystem) -> String {
     let x = Scale::new(
-        &panel.x,
+        (&panel.x, system),
         panel.series.iter().flat_map(places),
         LEFT,
         WIDTH - RIGHT,
     );
     let y = Scale::new(
-        &panel.y,
+        (&panel.y, system),
         panel.series.iter().flat_map(values),
         HEIGHT - BOTTOM,
         TOP,
@@ -50,7 +49,7 @@ pub fn svg(panel: &Panel) -> String {
         HEIGHT - BOTTOM - TOP + 6.0,
         title = escaped(&panel.title),
     );
-    grid(&mut out, panel, &x, &y);
+    grid(&mut out, panel, system, &x, &y);
     out.push_str("<g clip-path=\"url(#plot)\" fill=\"none\" stroke-linejoin=\"round\">\n");
     for (order, series) in panel.series.iter().enumerate() {
         draw(&mut out, series, colour(series, order), &x, &y);
@@ -73,8 +72,13 @@ struct Scale {
 }
 
 impl Scale {
-    fn new(axis: &Axis, data: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
-        let (unit, _) = axis.units.unit(UnitSystem::of_text());
+    fn new(
+        (axis, system): (&Axis, UnitSystem),
+        data: impl Iterator<Item = f64>,
+        from: f64,
+        to: f64,
+    ) -> Self {
+        let (unit, _) = axis.units.unit(system);
         let shown = |value: f64| {
             let value = value / unit;
             if axis.logarithmic {
@@ -183,7 +187,7 @@ fn colour(series: &Series, order: usize) -> &'static str {
     }
 }
 
-fn grid(out: &mut String, panel: &Panel, x: &Scale, y: &Scale) {
+fn grid(out: &mut String, panel: &Panel, system: UnitSystem, x: &Scale, y: &Scale) {
     let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
     for (at, label) in x.ticks() {
         let _ = writeln!(
@@ -207,18 +211,18 @@ fn grid(out: &mut String, panel: &Panel, x: &Scale, y: &Scale) {
         "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
         (LEFT + right) / 2.0,
         HEIGHT - 12.0,
-        axis_title(&panel.x)
+        axis_title(&panel.x, system)
     );
     let _ = writeln!(
         out,
         "<text transform=\"translate(18 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
         (TOP + bottom) / 2.0,
-        axis_title(&panel.y)
+        axis_title(&panel.y, system)
     );
 }
 
-fn axis_title(axis: &Axis) -> String {
-    let (_, unit) = axis.units.unit(UnitSystem::of_text());
+fn axis_title(axis: &Axis, system: UnitSystem) -> String {
+    let (_, unit) = axis.units.unit(system);
     let title = if unit.is_empty() {
         axis.label.clone()
     } else {

@@ -185,7 +185,7 @@ fn structure(page: &str) -> String {
 fn the_page_refers_to_nothing_outside_itself() {
     for report in [run_report(), gallery()] {
         // Files are handed to the reader as blobs, and a picture clips at a shape of its own: no requests.
-        let page = html(&report).unwrap().to_lowercase();
+        let page = html(&report, None).unwrap().to_lowercase();
         let page = page
             .replace("createobjecturl(", "")
             .replace("revokeobjecturl(", "")
@@ -233,7 +233,7 @@ fn the_page_refers_to_nothing_outside_itself() {
 #[test]
 fn the_embedded_numbers_are_json_and_are_the_numbers() {
     let report = run_report();
-    let page = html(&report).unwrap();
+    let page = html(&report, None).unwrap();
     let text = between(&page, "id=\"panels\">", "</script>");
     let panels: serde_json::Value = serde_json::from_str(text).unwrap();
     let embedded = panels.as_array().unwrap();
@@ -255,7 +255,7 @@ fn the_embedded_numbers_are_json_and_are_the_numbers() {
             assert_eq!(letters * 6 / 8 / 4, series.values.len(), "{}", series.name);
         }
     }
-    let text = html(&gallery()).unwrap();
+    let text = html(&gallery(), None).unwrap();
     let text = between(&text, "id=\"panels\">", "</script>");
     let panels: serde_json::Value = serde_json::from_str(text).unwrap();
     assert_eq!(panels[0]["title"], "Gain </script>");
@@ -274,31 +274,34 @@ fn a_long_run_stays_a_small_file() {
         ..motion
     };
     let (displacement, velocity, acceleration) = followed(&motion);
-    let page = html(&run(&Run {
-        system: "three-variable",
-        motion: &motion,
-        duration: motion.duration(),
-        displacement: &displacement,
-        velocity: &velocity,
-        acceleration: &acceleration,
-        identity: Vec::new(),
-        commands: vec![
-            ("control.valve_command".into(), velocity.clone()),
-            ("interlock.valve_command".into(), velocity.clone()),
-        ],
-        valve_limit: Some(10.0),
-        specimen: Some(SpecimenHistory {
-            drift: displacement.clone(),
-            force: acceleration.clone(),
+    let page = html(
+        &run(&Run {
+            system: "three-variable",
+            motion: &motion,
+            duration: motion.duration(),
+            displacement: &displacement,
+            velocity: &velocity,
+            acceleration: &acceleration,
+            identity: Vec::new(),
+            commands: vec![
+                ("control.valve_command".into(), velocity.clone()),
+                ("interlock.valve_command".into(), velocity.clone()),
+            ],
+            valve_limit: Some(10.0),
+            specimen: Some(SpecimenHistory {
+                drift: displacement.clone(),
+                force: acceleration.clone(),
+            }),
+            trip: Some((20.0, "the table left its reference".into())),
+            changed: Vec::new(),
+            components: Vec::new(),
+            tracking: None,
+            ended: "complete",
+            settings: Vec::new(),
+            footer: String::new(),
         }),
-        trip: Some((20.0, "the table left its reference".into())),
-        changed: Vec::new(),
-        components: Vec::new(),
-        tracking: None,
-        ended: "complete",
-        settings: Vec::new(),
-        footer: String::new(),
-    }))
+        None,
+    )
     .unwrap();
     println!("a minute at 500 Hz: {} bytes", page.len());
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
@@ -306,7 +309,7 @@ fn a_long_run_stays_a_small_file() {
 
 #[test]
 fn text_is_never_markup() {
-    let page = html(&gallery()).unwrap();
+    let page = html(&gallery(), None).unwrap();
     let structure = structure(&page);
     assert!(!structure.contains("<script>alert"));
     assert!(structure.contains("A gallery &lt;script&gt;"));
@@ -338,8 +341,8 @@ fn compare(name: &str, structure: &str) {
 
 #[test]
 fn structure_of_a_page() {
-    compare("gallery.html", &structure(&html(&gallery()).unwrap()));
-    compare("run.html", &structure(&html(&run_report()).unwrap()));
+    compare("gallery.html", &structure(&html(&gallery(), None).unwrap()));
+    compare("run.html", &structure(&html(&run_report(), None).unwrap()));
 }
 
 /// The pictures are well-formed XML, hold a drawing of every series, and no markup of the text.
@@ -347,7 +350,7 @@ fn structure_of_a_page() {
 fn pictures_are_well_formed() {
     for report in [run_report(), gallery()] {
         for panel in report.sections.iter().flat_map(|section| &section.panels) {
-            let picture = svg(panel);
+            let picture = svg(panel, UnitSystem::Us);
             let document = roxmltree::Document::parse(&picture).unwrap();
             assert_eq!(document.root_element().tag_name().name(), "svg");
             assert!(
@@ -381,16 +384,16 @@ fn a_picture_puts_values_where_the_axes_say() {
     };
     // The plot lies between x = 76 and 802, y = 42 and 268 of the picture.
     assert!(
-        svg(&panel).contains("M76.0 268.0L439.0 155.0L802.0 268.0"),
+        svg(&panel, UnitSystem::Us).contains("M76.0 268.0L439.0 155.0L802.0 268.0"),
         "{}",
-        svg(&panel)
+        svg(&panel, UnitSystem::Us)
     );
     // An empty plot is a plot still.
     let empty = Panel {
         series: Vec::new(),
         ..panel
     };
-    assert!(roxmltree::Document::parse(&svg(&empty)).is_ok());
+    assert!(roxmltree::Document::parse(&svg(&empty, UnitSystem::Us)).is_ok());
 }
 
 /// Writes the two pages and a picture where SHAKEBENCH_PAGES says, to be looked at.
@@ -400,9 +403,17 @@ fn pages_to_look_at() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = folder.unwrap_or_else(|| temporary.path().to_path_buf());
     for (name, report) in [("run", run_report()), ("gallery", gallery())] {
-        std::fs::write(folder.join(format!("{name}.html")), html(&report).unwrap()).unwrap();
+        std::fs::write(
+            folder.join(format!("{name}.html")),
+            html(&report, None).unwrap(),
+        )
+        .unwrap();
         for (n, panel) in report.sections.iter().flat_map(|s| &s.panels).enumerate() {
-            std::fs::write(folder.join(format!("{name}-{n}.svg")), svg(panel)).unwrap();
+            std::fs::write(
+                folder.join(format!("{name}-{n}.svg")),
+                svg(panel, UnitSystem::Us),
+            )
+            .unwrap();
         }
     }
     assert!(std::fs::metadata(folder.join("run.html")).unwrap().len() > 100_000);
@@ -430,5 +441,40 @@ fn an_error_is_the_reference_less_the_table() {
         let high = shown.iter().copied().fold(0.0, f64::max);
         let low = shown.iter().copied().fold(0.0, f64::min);
         assert_eq!(stroke.values, [low, high], "{}", stroke.name);
+    }
+}
+
+/// The triangle's limits are 4 in or 101.6 mm: the units are those that are asked for, and only without a wish can a
+/// reader switch them.
+#[test]
+fn pages_and_pictures_are_in_the_units_that_were_asked_for() {
+    let panel = Panel {
+        title: "triangle".into(),
+        x: Axis::linear("time", Units::TIME),
+        y: Axis::linear("displacement", Units::DISPLACEMENT).between(0.0, 4.0 * INCH),
+        series: vec![Series::history("a", 1.0, &[0.0, 2.0 * INCH, 0.0])],
+    };
+    let us = svg(&panel, UnitSystem::Us);
+    assert!(
+        us.contains("displacement [in]") && us.contains(">4<"),
+        "{us}"
+    );
+    let si = svg(&panel, UnitSystem::Si);
+    assert!(
+        si.contains("displacement [mm]") && si.contains(">100<"),
+        "{si}"
+    );
+    for (asked, tag) in [
+        (None, "data-units=\"laboratory\">"),
+        (
+            Some(UnitSystem::Us),
+            "data-units=\"laboratory\" data-units-asked=\"1\">",
+        ),
+        (
+            Some(UnitSystem::Si),
+            "data-units=\"si\" data-units-asked=\"1\">",
+        ),
+    ] {
+        assert!(html(&gallery(), asked).unwrap().contains(tag), "{tag}");
     }
 }

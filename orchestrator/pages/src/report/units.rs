@@ -1,7 +1,6 @@
-//! The two systems of units that results can be read in, and the one that is chosen.
+//! The two systems of units that results can be read in.
 
 use std::borrow::Cow;
-use std::sync::OnceLock;
 
 use units::{INCH, POUND_FORCE, STANDARD_GRAVITY};
 
@@ -15,28 +14,7 @@ pub enum UnitSystem {
     Si,
 }
 
-static CHOSEN: OnceLock<UnitSystem> = OnceLock::new();
-
 impl UnitSystem {
-    /// Chooses the system for this process; the first choice holds.
-    pub fn choose(self) {
-        // A second choice changes nothing, whatever it is.
-        let _ = CHOSEN.set(self);
-    }
-
-    /// The requested system; none: a page has buttons to choose, and a terminal shows the
-    /// laboratory's.
-    #[must_use]
-    pub fn chosen() -> Option<Self> {
-        CHOSEN.get().copied()
-    }
-
-    /// The system of what is printed.
-    #[must_use]
-    pub fn of_text() -> Self {
-        Self::chosen().unwrap_or_default()
-    }
-
     /// Its name in a page.
     pub(super) fn key(self) -> &'static str {
         match self {

@@ -33,7 +33,7 @@ use analysis::Findings;
 use laboratory::error::Error;
 use laboratory::results::{Out, Results};
 use pages::report::identity::{entry, version};
-use pages::report::{self, Cell};
+use pages::report::{self, Cell, UnitSystem};
 
 /// The table as text.
 pub const CSV: &str = "runs.csv";
@@ -82,13 +82,12 @@ pub fn write(
     findings: &Findings,
     folder: &Out,
 ) -> Result<Vec<PathBuf>, Error> {
-    let page = page::report(&carried.table, findings, about(study));
-    let page = report::render(&page, &folder.join(report::FILE))?;
+    let page = page::report(&carried.table, findings, about(study, folder.units()));
     let mut results = Results::begin(folder)?;
     if journal::is_there(folder) {
         results.supersede();
     }
-    results.write_text(report::FILE, &page)?;
+    results.write_page(report::FILE, &page)?;
     results.write(CSV, |file| files::csv(&carried.table, file))?;
     results.write(PARQUET, |file| files::parquet(&carried.table, file))?;
     results.write_json(FINDINGS, findings)?;
@@ -97,7 +96,7 @@ pub fn write(
 }
 
 /// What the page says of the study.
-fn about(study: &Study) -> page::About {
+fn about(study: &Study, units: UnitSystem) -> page::About {
     let name = |path: &Path| {
         path.file_name()
             .map(|name| name.to_string_lossy().into_owned())
@@ -111,6 +110,7 @@ fn about(study: &Study) -> page::About {
         title: title.unwrap_or_else(|| file.clone()),
         identity: identity(study),
         footer: format!("shakebench campaign {file}; seed {}", study.seed),
+        units,
     }
 }
 

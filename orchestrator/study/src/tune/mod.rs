@@ -444,9 +444,8 @@ impl Tuned {
     /// # Errors
     /// A folder that cannot be written.
     pub fn write(&self, folder: &Out) -> Result<Vec<PathBuf>, Error> {
-        let page = report::render(&page::page(self), &folder.join(report::FILE))?;
         let mut results = Results::begin(folder)?;
-        results.write_text(report::FILE, &page)?;
+        results.write_page(report::FILE, &page::page(self))?;
         results.write_json("tuned.json", self)?;
         let mut text = String::from("# Found by `shakebench tune`; for [fixed] of a study.\n");
         for own in &self.parameters {

@@ -77,7 +77,7 @@ pub(super) struct Wrong {
     pub what: String,
 }
 
-/// A name that lives as long as the program, as the kind that has it does ([`super::extended`] makes each once).
+/// A name that lives as long as the program, as the kind that has it does ([`super::extended`]).
 fn kept(text: &str) -> &'static str {
     Box::leak(text.to_owned().into_boxed_str())
 }

@@ -1,7 +1,6 @@
 //! A kind of rig with the user's own effects behind those of its catalogue.
 
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 
 use super::compiled::{Compiled, Place, Wrong};
 use super::running::rate;
@@ -20,7 +19,8 @@ struct ExtendedKind {
     catalogue: usize,
 }
 
-/// `base` with `hypotheses`, which the file `path` with this text holds.
+/// `base` with `hypotheses`, which the file `path` with this text holds. It lives as long as the program, as every
+/// kind does; a description asks once and keeps it.
 ///
 /// # Errors
 /// A hypothesis that does not fit the kind, by line and key.
@@ -32,27 +32,17 @@ pub fn extended(
     if hypotheses.is_empty() {
         return Ok(base);
     }
-    // A description asks for its rig again and again: every one is made once and kept.
-    type Known = (&'static str, Hypotheses, &'static ExtendedKind);
-    static KNOWN: Mutex<Vec<Known>> = Mutex::new(Vec::new());
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    let is_same = |own: &&Known| own.0 == base.kind() && own.1 == *hypotheses;
-    if let Some((.., rig)) = known.iter().find(is_same) {
-        return Ok(*rig);
-    }
     let mut own = Vec::new();
     for (name, hypothesis) in hypotheses {
         let compiled = Compiled::new(name, hypothesis, base);
         own.push(compiled.map_err(|wrong| refused(wrong, name, path))?);
     }
     let catalogue = base.effects().iter().map(|effect| effect.off.len()).sum();
-    let rig: &'static ExtendedKind = Box::leak(Box::new(ExtendedKind {
+    Ok(Box::leak(Box::new(ExtendedKind {
         base,
         own,
         catalogue,
-    }));
-    known.push((base.kind(), hypotheses.clone(), rig));
-    Ok(rig)
+    })))
 }
 
 fn refused(wrong: Wrong, name: &str, path: &Path) -> DescriptionError {

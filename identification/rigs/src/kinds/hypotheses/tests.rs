@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Hypotheses, extended};
-use crate::kinds::{Rig, RigRecording, Values, of_kind};
+use crate::kinds::{Description, Rig, RigRecording, Values, of_kind};
 use recordings::{Channel, Recording};
 
 fn parsed(text: &str) -> Hypotheses {
@@ -357,4 +357,43 @@ a = { start = 0.01, range = [0, 0.1], unit = "s" }
     }
     assert!(error("").contains("no effect: expected a table"));
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_description_makes_its_rig_once_and_anew_with_other_effects() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, effect: &str| {
+        let path = folder.path().join(name);
+        let text = format!(
+            "[{effect}]\nat = \"input\"\nvalue = \"u + a * du\"\nsentence = \"it leads by {{a}}\"\n\
+             parameters.a = {{ start = 0.01, range = [0, 0.1], unit = \"s\" }}\n"
+        );
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let text = r#"
+name = "axis"
+kind = "linear_axis"
+data = []
+columns = {}
+nominal = {}
+left_out = { second_half = true }
+"#;
+    let bare = Description::parse(Path::new("axis.toml"), text).unwrap();
+    let one = bare
+        .clone()
+        .with_effects(&write("one.toml", "one"))
+        .unwrap();
+    let rig = one.rig().unwrap();
+    // A copy shares what its original made.
+    assert!(std::ptr::eq(rig, one.clone().rig().unwrap()));
+    let has = |rig: &dyn Rig, name: &str| {
+        let mut all = rig.effects().into_iter();
+        all.any(|effect| effect.candidate.effect == name)
+    };
+    let both = one.with_effects(&write("two.toml", "two")).unwrap();
+    let both = both.rig().unwrap();
+    assert!(has(rig, "one") && !has(rig, "two"));
+    assert!(has(both, "one") && has(both, "two"));
+    assert!(!has(bare.rig().unwrap(), "one"));
 }

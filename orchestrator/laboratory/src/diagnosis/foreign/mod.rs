@@ -115,9 +115,8 @@ pub fn diagnose(
     })?;
     report.wall_s = begun.elapsed().as_secs_f64();
     let panels = pictures::panels(&subject, &found);
-    let page = page::of_foreign(&subject.name, model, &report, panels);
-    let page = report::render(&page, &folder.join(report::FILE))?;
-    results.write_text(report::FILE, &page)?;
+    let page = page::of_foreign(&subject.name, model, &report, panels, folder.units());
+    results.write_page(report::FILE, &page)?;
     results.write_text(DIAGNOSIS, &format!("{:#}\n", serde_json::json!(report)))?;
     results.finish()?;
     Ok(report)

@@ -7,7 +7,7 @@ mod words;
 
 use super::analysis::{Findings, Method};
 use super::table::Table;
-use pages::report::{Cell, Report, Section};
+use pages::report::{Cell, Report, Section, UnitSystem};
 
 pub use ranking::{sentences, standings};
 pub use words::summary;
@@ -21,6 +21,8 @@ pub struct About {
     pub identity: Vec<(String, Cell)>,
     /// Last line: versions, seed, how to repeat.
     pub footer: String,
+    /// Units of its sentences.
+    pub units: UnitSystem,
 }
 
 /// The page of what `table` says, as [`super::analysis::analyse`] found it.
@@ -28,7 +30,7 @@ pub struct About {
 pub fn report(table: &Table, findings: &Findings, about: About) -> Report {
     let mut sections = vec![error(table, findings)];
     sections.extend(findings.ranking.as_ref().map(ranking::section));
-    sections.push(fragility(findings));
+    sections.push(fragility(findings, about.units));
     sections.extend(importance(findings));
     sections.push(Section {
         heading: "The worst runs".into(),
@@ -60,7 +62,7 @@ pub fn report(table: &Table, findings: &Findings, about: About) -> Report {
     });
     Report {
         title: about.title,
-        summary: summary(findings),
+        summary: summary(findings, about.units),
         identity: about.identity,
         facts: tables::facts(findings),
         sections,
@@ -83,13 +85,13 @@ fn error(table: &Table, findings: &Findings) -> Section {
     }
 }
 
-fn fragility(findings: &Findings) -> Section {
+fn fragility(findings: &Findings, units: UnitSystem) -> Section {
     Section {
         heading: "Fragility".into(),
         text: vec![words::fragility(findings)],
-        notes: words::without_curve(findings),
-        panels: pictures::fragility(findings),
-        tables: tables::fragility(findings),
+        notes: words::without_curve(findings, units),
+        panels: pictures::fragility(findings, units),
+        tables: tables::fragility(findings, units),
         ..Section::default()
     }
 }

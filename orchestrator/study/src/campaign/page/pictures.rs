@@ -8,7 +8,7 @@ use super::words;
 use crate::campaign::analysis::{ERROR, Findings, Fit, Fragility, Importance};
 use crate::campaign::table::Table;
 use fmi_master::Ending;
-use pages::report::{Abscissa, Axis, Bar, BarGroup, Bars, Panel, Series, Style, Units};
+use pages::report::{Abscissa, Axis, Bar, BarGroup, Bars, Panel, Series, Style, UnitSystem, Units};
 
 /// Dots of a picture, in all.
 const MOST_DOTS: usize = 2000;
@@ -127,7 +127,7 @@ pub(super) fn scatter(table: &Table, findings: &Findings) -> Option<Panel> {
 }
 
 /// A picture for each limit that some run exceeded and some did not.
-pub(super) fn fragility(findings: &Findings) -> Vec<Panel> {
+pub(super) fn fragility(findings: &Findings, units: UnitSystem) -> Vec<Panel> {
     let names: Vec<&str> = words::compared(findings)
         .iter()
         .map(|own| own.value.as_str())
@@ -167,7 +167,7 @@ pub(super) fn fragility(findings: &Findings) -> Vec<Panel> {
             series.push(dots.styled(Style::Points).coloured(colour(own)));
         }
         panels.push(Panel {
-            title: words::limit(&curves[0]),
+            title: words::limit(&curves[0], units),
             x: intensity_axis(findings),
             y: Axis::linear("share of runs", Units::NONE).between(0.0, 1.0),
             series,

@@ -4,7 +4,7 @@ use super::words;
 use crate::campaign::analysis::{
     ERROR, Ended, Findings, Fit, Group, Importance, Method, Quantiles,
 };
-use pages::report::{Cell, Fact, Table, Units};
+use pages::report::{Cell, Fact, Table, UnitSystem, Units};
 
 /// Values of one factor that get a row each.
 const MOST_VALUES: usize = 40;
@@ -145,7 +145,7 @@ fn compared_figures(findings: &Findings) -> Vec<&str> {
 }
 
 /// The curves' medians and dispersions, one table per limit.
-pub(super) fn fragility(findings: &Findings) -> Vec<Table> {
+pub(super) fn fragility(findings: &Findings, system: UnitSystem) -> Vec<Table> {
     let units = words::intensity_units(findings);
     let heads = [
         "runs of",
@@ -183,7 +183,7 @@ pub(super) fn fragility(findings: &Findings) -> Vec<Table> {
             let caption = format!(
                 "{}: intensity at which half of the runs exceed the limit, and deviation of its \
                  logarithm, with 95 % intervals",
-                words::limit(&curves[0])
+                words::limit(&curves[0], system)
             );
             Table::headed(&caption, rows)
         })

@@ -58,7 +58,7 @@ fn shares_have_the_places_they_need() {
 #[test]
 fn a_page_of_ten_thousand_runs_is_small() {
     let (_, _, page) = made(10_000);
-    let text = pages::report::html(&page).unwrap();
+    let text = pages::report::html(&page, None).unwrap();
     println!("{} bytes", text.len());
     assert!(text.len() < 500_000);
     if let Some(folder) = std::env::var_os("SHAKEBENCH_PICTURES") {
@@ -79,7 +79,7 @@ fn few_runs_and_one_controller_make_a_page_too() {
         table.rows.retain(|row| row[2].text() == Some("mpc"));
         let findings = analyse(&table, &settings, &command);
         let page = report(&table, &findings, About::default());
-        assert!(pages::report::html(&page).is_ok());
+        assert!(pages::report::html(&page, None).is_ok());
         assert!(!page.summary.is_empty());
         serde_json::to_string(&findings).unwrap();
     }

@@ -95,8 +95,8 @@ pub(super) fn intensity_units(findings: &Findings) -> Units {
 }
 
 /// A value with its unit, for a sentence.
-pub(super) fn quantity(value: f64, units: &Units) -> String {
-    Cell::Quantity(value, units.clone(), 3).text(UnitSystem::of_text())
+pub(super) fn quantity(value: f64, units: &Units, system: UnitSystem) -> String {
+    Cell::Quantity(value, units.clone(), 3).text(system)
 }
 
 /// The groups that are compared: the controllers, or all runs as one.
@@ -112,7 +112,7 @@ pub(super) fn compared(findings: &Findings) -> Vec<&Group> {
 
 /// What came of the study, in a few sentences: error, limit, factor.
 #[must_use]
-pub fn summary(findings: &Findings) -> String {
+pub fn summary(findings: &Findings, system: UnitSystem) -> String {
     let invalid = invalid(findings);
     let Some(all) = findings.groups.first().filter(|all| all.endings.runs > 0) else {
         return format!("No run.{invalid}");
@@ -177,7 +177,7 @@ pub fn summary(findings: &Findings) -> String {
     if !told.is_empty() && is_new {
         text += &format!(" Of all {} runs {told}.", count(all.endings.runs));
     }
-    if let Some(limit) = half(findings, groups[0]) {
+    if let Some(limit) = half(findings, groups[0], system) {
         text += &format!(" {limit}");
     }
     if let Some(factor) = decides(findings) {
@@ -228,7 +228,7 @@ fn early(endings: Endings, before: &str) -> String {
 }
 
 /// Where half of the runs of the best controller exceed the first limit that has a curve.
-fn half(findings: &Findings, best: &Group) -> Option<String> {
+fn half(findings: &Findings, best: &Group, system: UnitSystem) -> Option<String> {
     findings.fragility.iter().find_map(|own| {
         let (Fit::Lognormal(curve), Some(limit)) = (&own.fit, &own.limit) else {
             return None;
@@ -241,11 +241,11 @@ fn half(findings: &Findings, best: &Group) -> Option<String> {
         let under = under.map_or(String::new(), |name| format!(" under {name}"));
         let units = intensity_units(findings);
         let [median, low, high] = [curve.median, curve.median_band[0], curve.median_band[1]]
-            .map(|at| quantity(at, &units));
+            .map(|at| quantity(at, &units, system));
         is_best.then(|| {
             format!(
                 "Half of the runs exceed {} of {limit}{under} at {median} of {} ({low} to {high}).",
-                above(own),
+                above(own, system),
                 label(&findings.intensity)
             )
         })
@@ -253,27 +253,27 @@ fn half(findings: &Findings, best: &Group) -> Option<String> {
 }
 
 /// What is exceeded, as a heading.
-pub(super) fn limit(own: &Fragility) -> String {
+pub(super) fn limit(own: &Fragility, system: UnitSystem) -> String {
     match &own.limit {
         Some(name) => {
             let what = match label(name) {
                 same if same == *name => same,
                 figure => capital(&figure),
             };
-            format!("{what} above {}", above(own))
+            format!("{what} above {}", above(own, system))
         }
         None => "Stopped by the interlock".to_string(),
     }
 }
 
 /// The limit with its unit.
-pub(super) fn above(own: &Fragility) -> String {
+pub(super) fn above(own: &Fragility, system: UnitSystem) -> String {
     let units = units(
         own.column.as_deref().unwrap_or_default(),
         own.unit.as_deref(),
     );
     own.above
-        .map_or(String::new(), |above| quantity(above, &units))
+        .map_or(String::new(), |above| quantity(above, &units, system))
 }
 
 /// The factor that decides over the error.
@@ -359,11 +359,12 @@ pub(super) fn fragility(findings: &Findings) -> String {
 }
 
 /// The limits that have no curve, and why.
-pub(super) fn without_curve(findings: &Findings) -> Vec<String> {
+pub(super) fn without_curve(findings: &Findings, system: UnitSystem) -> Vec<String> {
     let told = findings.fragility.iter().filter_map(|own| {
         let under = own.controller.as_ref();
         let under = under.map_or(String::new(), |name| format!(", {name}"));
-        without(own, &label(&findings.intensity)).map(|why| format!("{}{under}: {why}", limit(own)))
+        without(own, &label(&findings.intensity))
+            .map(|why| format!("{}{under}: {why}", limit(own, system)))
     });
     told.collect()
 }
