@@ -1,6 +1,6 @@
 //! Servo-hydraulic actuator in a closed displacement loop: command to displacement.
 //!
-//! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K`,
+//! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K - y x`,
 //! `T/2 q' = K c - q`, `T/2 w' = q - w`, `P² v'' + 2 d P v' + v = w`, `x' = v` (Merritt, Hydraulic Control Systems, 1967: a
 //! valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
 //! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. Two lags in a row
@@ -34,6 +34,8 @@ const COMMAND: Channel = Channel::Other {
 /// The loop's gain times a step at most, where it is not linear, and the most steps of a sample.
 const FINE: f64 = 0.25;
 const MOST_STEPS: f64 = 64.0;
+/// Integral below which it does not make up for a spring, and the scale holds what that takes, 1/s.
+const SLOW: f64 = 0.1;
 /// The fewest: between samples the command follows a curve, and friction is even over a step.
 const SMOOTH: f64 = 2.0;
 
@@ -54,6 +56,8 @@ nominal_parameters! {
     feedforward: "1" = 0.0,
     /// i: integral over proportional gain.
     integral: "1/s" = 0.0,
+    /// y: share of the displacement by which a spring under the table holds it back until the integral makes up for it.
+    spring_droop: "1" = 0.0,
     /// P: one over the angular frequency of the mass on the oil, or of a second lag; 0 for none.
     resonance: "s" = 0.0,
     /// d: its damping ratio.
@@ -176,6 +180,7 @@ impl Equations for ClosedLoopActuator {
                 nominal.loop_lag,
                 nominal.feedforward,
                 nominal.integral,
+                nominal.spring_droop,
                 nominal.resonance,
                 nominal.resonance_damping,
             ],
@@ -206,6 +211,7 @@ impl Equations for ClosedLoopActuator {
             or_small(if has_second { 0.0 } else { own.lag }, nominal.loop_lag),
             or_small(own.feedforward, nominal.feedforward),
             or_small(own.integral, nominal.integral),
+            nominal.spring_droop,
             or_small(resonance, nominal.resonance),
             if has_second {
                 (0.5 * own.lag / resonance).clamp(0.05, 3.0)
@@ -264,6 +270,7 @@ impl Equations for ClosedLoopActuator {
             loop_lag,
             feedforward,
             integral,
+            spring_droop,
             resonance,
             resonance_damping,
         } = *nominal;
@@ -302,6 +309,7 @@ impl Equations for ClosedLoopActuator {
             loop_lag: valve + loop_lag,
             feedforward,
             integral,
+            spring_droop: spring_droop * integral / (integral + SLOW),
             resonance,
             resonance_damping,
             rubs: breakaway_error > 0.0,
@@ -410,6 +418,7 @@ mod tests {
             loop_lag: 0.0,
             feedforward: 0.0,
             integral: 0.0,
+            spring_droop: 0.0,
             resonance: 0.0,
             resonance_damping: 0.5,
         }
@@ -547,6 +556,49 @@ mod tests {
 
         assert!(off(b) < 1e-3, "{}", off(b));
         assert!(off(0.0) > 0.03, "{}", off(0.0));
+    }
+
+    #[test]
+    fn a_spring_under_a_shaker_whose_integral_makes_up_for_it_is_that_of_its_own_equations() {
+        // L i' = c - R i - b v, m v' = b i - s x, c of proportion and integral, by small steps of its own.
+        let (mass, resistance, inductance, constant, stiffness) = (20.0, 1.0, 1e-3, 80.0, 9000.0);
+        let (gain, integral) = (30.0, 0.8);
+        let (rate, n, steps) = (200.0, 4000, 200);
+        let wave = |t: f64| 4e-3 * (1.3 * t).sin() + 2e-3 * (9.0 * t).sin();
+        let command: Vec<f64> = (0..n).map(|k| wave(k as f64 / rate)).collect();
+        let (mut current, mut x, mut v, mut sum) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+        let h = 1.0 / rate / f64::from(steps);
+        let mut measured = Vec::new();
+        for k in 0..n {
+            measured.push(x);
+            for part in 0..steps {
+                let t = k as f64 / rate + f64::from(part) * h;
+                sum += h * integral * (wave(t) - x);
+                let voltage = gain * constant * (wave(t) - x + sum);
+                current += h * (voltage - resistance * current - constant * v) / inductance;
+                v += h * (constant * current - stiffness * x) / mass;
+                x += h * v;
+            }
+        }
+        let resonance = (mass * inductance).sqrt() / constant;
+        let taken = stiffness * resistance / (constant * constant * gain);
+        let off = |spring_droop: f64| {
+            let nominal = Nominal {
+                integral,
+                spring_droop,
+                resonance,
+                resonance_damping: 0.5 * resonance * resistance / inductance,
+                ..proportional(gain)
+            };
+            let out = answer(rate, &command, &nominal, &Effects::off().unwrap());
+            let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
+            let size: f64 = measured.iter().map(|x| x * x).sum();
+            (errors.sum::<f64>() / size).sqrt()
+        };
+
+        let droop = taken * (integral + SLOW) / integral;
+        assert!(off(droop) < 1e-3, "{}", off(droop));
+        assert!(off(0.0) > 0.02, "{}", off(0.0));
     }
 
     #[test]

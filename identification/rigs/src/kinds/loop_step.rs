@@ -10,6 +10,8 @@ pub(super) struct Loop {
     pub(super) loop_lag: f64,
     pub(super) feedforward: f64,
     pub(super) integral: f64,
+    /// Share of the displacement that a spring takes of the command: before the lags, which are short beside it.
+    pub(super) spring_droop: f64,
     pub(super) resonance: f64,
     pub(super) resonance_damping: f64,
     /// Whether there is friction.
@@ -142,6 +144,7 @@ impl Loop {
             [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
         };
         let mut sent: [f64; 6] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
+        sent[1] -= self.spring_droop;
         sent[3] += 1.0;
         // Places of the command, its slope, the flow beyond, its slope and friction behind the states.
         let [command, slope, beyond, its_slope, friction] = std::array::from_fn(|i| STATES + i);
@@ -273,6 +276,7 @@ mod tests {
             loop_lag: 0.003,
             feedforward: 0.4,
             integral: 0.7,
+            spring_droop: 0.05,
             resonance: 0.004,
             resonance_damping: 0.3,
             rubs: false,

@@ -178,7 +178,7 @@ impl OneInput {
     }
 
     /// Nominal values of a closed loop, by the response's slowest pole and its delay.
-    fn closed_loop(&self) -> [(&'static str, Quantity); 10] {
+    fn closed_loop(&self) -> [(&'static str, Quantity); 11] {
         let scale = self.model.response(1e-3, self.period).re;
         let slowest = self.model.poles().into_iter().map(|pole| pole.norm());
         let gain = slowest.fold(f64::INFINITY, f64::min);
@@ -191,6 +191,7 @@ impl OneInput {
             ("command_lag", quantity(0.0, 0.0, "s")),
             ("feedforward", quantity(0.1, 0.1, "1")),
             ("integral", quantity(0.1, 0.1, "1/s")),
+            ("spring_droop", quantity(0.01, 0.01, "1")),
             ("command_delay", quantity(self.model.delay, 3e-3, "s")),
             ("scale", quantity(scale, 0.02, "1")),
             ("offset", quantity(0.0, 0.1 * moves, "m")),

@@ -417,6 +417,7 @@ fn closed_loop(command: &[f64], one: &RigRecording) -> Vec<Start> {
         ("command_lag", 0.0, 0.0, "s"),
         ("feedforward", 0.1, 0.1, "1"),
         ("integral", 0.1, 0.1, "1/s"),
+        ("spring_droop", 0.01, 0.01, "1"),
         // Beyond two of these deviations they are causes.
         ("command_delay", 0.0, 1.5e-3, "s"),
         ("scale", 1.0, 0.01, "1"),

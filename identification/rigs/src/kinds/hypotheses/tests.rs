@@ -90,7 +90,7 @@ fn agree(all: [Vec<f64>; 3], within: f64) {
     assert!(differ <= within * change, "{differ} of {change}");
 }
 
-const LOOP: [f64; 10] = [40.0, 0.004, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5];
+const LOOP: [f64; 11] = [40.0, 0.004, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5];
 const OSCILLATOR: [f64; 4] = [10.0, 40.0, 9000.0, 0.0];
 
 #[test]
