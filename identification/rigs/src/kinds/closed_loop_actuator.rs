@@ -33,7 +33,7 @@ const COMMAND: Channel = Channel::Other {
 
 /// The loop's gain times a step at most, where it is not linear, and the most steps of a sample.
 const FINE: f64 = 0.25;
-const MOST_STEPS: f64 = 64.0;
+const MOST_STEPS: f64 = 16.0;
 /// Integral below which it does not make up for a spring, and the scale holds what that takes, 1/s.
 const SLOW: f64 = 0.1;
 /// The fewest: between samples the command follows a curve, and friction is even over a step.

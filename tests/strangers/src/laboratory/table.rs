@@ -282,14 +282,14 @@ impl Table {
         let (mut sum, mut before, mut command) = (0.0, 0.0, 0.0);
         let mut readings = Vec::with_capacity(reference.len());
         let mut railed = 0.0;
-        let (mut total, mut count) = (0.0, 0.0);
+        let mut speed = 0.0;
         for k in 0..reference.len() * ticks {
             let t = k as f64 * period;
-            let [x, a, f] = self.reading(&state, command);
-            (total, count) = (total + a, count + 1.0);
+            let [x, v, a, f] = self.reading(&state, command);
+            // The mean over all instants of a sample: those at which the controller steps are no fair choice of them.
             if k % ticks == 0 {
-                readings.push([x, total / count, f]);
-                (total, count) = (0.0, 0.0);
+                readings.push([x, (v - speed) * rate, f]);
+                speed = v;
             }
             let r = at(t);
             let rate_of = |t: f64| (at(t + period) - at(t - period)) / (2.0 * period);
@@ -323,14 +323,17 @@ impl Table {
         (readings, railed)
     }
 
-    fn reading(&self, state: &Moving, command: f64) -> [f64; 3] {
+    /// Displacement, velocity, acceleration and force.
+    fn reading(&self, state: &Moving, command: f64) -> [f64; 4] {
         match (&self.body, state) {
             (Body::Hydraulic(rig), Moving::Hydraulic(state)) => {
                 let now = rig.now(&state.values, command, 0.0);
-                [state.values[4], now.acceleration, now.force]
+                let [.., x, v, _, _, _] = state.values;
+                [x, v, now.acceleration, now.force]
             }
             (Body::Electric(electric), Moving::Electric(state)) => [
                 state[1],
+                state[2],
                 electric.slope(state, command)[2],
                 electric.constant * state[0],
             ],
@@ -418,6 +421,30 @@ mod tests {
                 (found / expected - 1.0).abs() < 0.05,
                 "{seed}: {found} {expected}"
             );
+        }
+    }
+
+    #[test]
+    fn an_accelerometer_shows_the_table_s_motion_between_rails() {
+        for (seed, drive) in [(1, Drive::Motor), (2, Drive::Shaker)] {
+            let table = Table::draw(drive, &mut Dice::new(seed, 0));
+            let rate = 200.0;
+            let wave = |k: u32| 0.05 * (TAU * f64::from(k) / rate).sin();
+            let motion: Vec<f64> = (0..2000).map(wave).collect();
+            let (readings, railed) = table.play(&motion, rate, 0.0, 0.0);
+            assert!(railed > 0.1, "{drive:?}: {railed}");
+            // At the motion's own frequency, after its begin.
+            let line = |i: usize| {
+                let own = (1000..2000).map(|k| {
+                    let angle = TAU * f64::from(k) / rate;
+                    let value = readings[k as usize][i];
+                    (value * angle.cos(), value * angle.sin())
+                });
+                let (re, im) = own.fold((0.0, 0.0), |all, own| (all.0 + own.0, all.1 + own.1));
+                f64::hypot(re, im)
+            };
+            let found = line(1) / (TAU * TAU * line(0));
+            assert!((found - 1.0).abs() < 2e-3, "{drive:?}: {found}");
         }
     }
 
