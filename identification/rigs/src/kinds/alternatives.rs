@@ -5,7 +5,7 @@ use super::PartReport;
 use super::confirmed::{clearly_better, lengths, unfit, without_effect};
 use super::parts::{EVERYTHING, InParts};
 use super::readings::{Crossed, NEEDED, likelier};
-use diagnosis::{Observer, Point, all_errors, looked, refit, settled};
+use diagnosis::{Observer, Point, all_errors, looked, refit, settled, squares};
 use rayon::prelude::*;
 
 /// Logarithm of how much less likely a model is that does nearly as well.
@@ -61,11 +61,17 @@ impl Rival {
     fn likelier_than(&self, other: &Self) -> f64 {
         self.crossed.likelier_than(&other.crossed) + likelier(&self.errors, &other.errors)
     }
+
+    /// Whether all data are fitted better than by `other`, by a tenth of the squared error.
+    fn fits_better_than(&self, other: &Self) -> bool {
+        squares(&other.errors) > NEEDED * squares(&self.errors)
+    }
 }
 
 /// The model at `point` and those with effects in the place of others of their class, each from the best of its
 /// starts. First the likeliest, or one that is nearly as likely with effects that are more common; the rest are
-/// those that do nearly as well.
+/// those that do nearly as well, and those that fit all data better though either part predicts the other worse: the
+/// data do not say which.
 pub(super) fn of_its_class<M: InParts>(
     measured: &M,
     point: &Point,
@@ -109,7 +115,8 @@ pub(super) fn of_its_class<M: InParts>(
     let best = all.swap_remove(best);
     all.retain(|own| replaced(&best.point, &own.point).is_some());
     let behind = all.into_iter().map(|own| (best.likelier_than(&own), own));
-    let mut near: Vec<(f64, Rival)> = behind.filter(|(by, _)| *by < NEARLY).collect();
+    let is_near = |(by, own): &(f64, Rival)| *by < NEARLY || own.fits_better_than(&best);
+    let mut near: Vec<(f64, Rival)> = behind.filter(is_near).collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0));
     let others: Vec<Rival> = near.into_iter().map(|(_, own)| own).collect();
     let own = [best].into_iter().chain(others);

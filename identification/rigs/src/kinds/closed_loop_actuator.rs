@@ -560,29 +560,33 @@ mod tests {
 
     #[test]
     fn a_spring_under_a_shaker_whose_integral_makes_up_for_it_is_that_of_its_own_equations() {
-        // L i' = c - R i - b v, m v' = b i - s x, c of proportion and integral, by small steps of its own.
+        // L i' = c - R i - b v, m v' = b i - s x, c of proportion and integral up to a rail, by small steps of its own.
         let (mass, resistance, inductance, constant, stiffness) = (20.0, 1.0, 1e-3, 80.0, 9000.0);
         let (gain, integral) = (30.0, 0.8);
         let (rate, n, steps) = (200.0, 4000, 200);
         let wave = |t: f64| 4e-3 * (1.3 * t).sin() + 2e-3 * (9.0 * t).sin();
         let command: Vec<f64> = (0..n).map(|k| wave(k as f64 / rate)).collect();
-        let (mut current, mut x, mut v, mut sum) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
-        let h = 1.0 / rate / f64::from(steps);
-        let mut measured = Vec::new();
-        for k in 0..n {
-            measured.push(x);
-            for part in 0..steps {
-                let t = k as f64 / rate + f64::from(part) * h;
-                sum += h * integral * (wave(t) - x);
-                let voltage = gain * constant * (wave(t) - x + sum);
-                current += h * (voltage - resistance * current - constant * v) / inductance;
-                v += h * (constant * current - stiffness * x) / mass;
-                x += h * v;
+        let measured = |rail: f64| {
+            let (mut current, mut x, mut v, mut sum) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            let h = 1.0 / rate / f64::from(steps);
+            let mut measured = Vec::new();
+            for k in 0..n {
+                measured.push(x);
+                for part in 0..steps {
+                    let t = k as f64 / rate + f64::from(part) * h;
+                    sum += h * integral * (wave(t) - x);
+                    let asked = gain * constant * (wave(t) - x + sum);
+                    let voltage = asked.clamp(-rail, rail);
+                    current += h * (voltage - resistance * current - constant * v) / inductance;
+                    v += h * (constant * current - stiffness * x) / mass;
+                    x += h * v;
+                }
             }
-        }
+            measured
+        };
         let resonance = (mass * inductance).sqrt() / constant;
         let taken = stiffness * resistance / (constant * constant * gain);
-        let off = |spring_droop: f64| {
+        let off = |spring_droop: f64, rail: f64| {
             let nominal = Nominal {
                 integral,
                 spring_droop,
@@ -590,15 +594,26 @@ mod tests {
                 resonance_damping: 0.5 * resonance * resistance / inductance,
                 ..proportional(gain)
             };
-            let out = answer(rate, &command, &nominal, &Effects::off().unwrap());
+            let limited = SpeedLimit {
+                slowness: constant / rail,
+            };
+            let effects = Effects {
+                speed_limit: limited,
+                ..Effects::off().unwrap()
+            };
+            let out = answer(rate, &command, &nominal, &effects);
+            let measured = measured(rail);
             let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
             let size: f64 = measured.iter().map(|x| x * x).sum();
             (errors.sum::<f64>() / size).sqrt()
         };
 
         let droop = taken * (integral + SLOW) / integral;
-        assert!(off(droop) < 1e-3, "{}", off(droop));
-        assert!(off(0.0) > 0.02, "{}", off(0.0));
+        let [never, often] = [1e6, 0.9];
+        assert!(off(droop, never) < 1e-3, "{}", off(droop, never));
+        assert!(off(0.0, never) > 0.02, "{}", off(0.0, never));
+        assert!(off(droop, often) < 3e-3, "{}", off(droop, often));
+        assert!(off(0.0, often) > 0.02, "{}", off(0.0, often));
     }
 
     #[test]

@@ -144,13 +144,14 @@ impl Loop {
             [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
         };
         let mut sent: [f64; 6] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
-        sent[1] -= self.spring_droop;
         sent[3] += 1.0;
         // Places of the command, its slope, the flow beyond, its slope and friction behind the states.
         let [command, slope, beyond, its_slope, friction] = std::array::from_fn(|i| STATES + i);
         let column = |i: usize| [0, 1, 2, 3, command, slope, beyond][i];
         let mut a = SMatrix::<f64, ALL, ALL>::zeros();
-        let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| gain * s));
+        // The spring holds the table back behind whatever bounds what is sent.
+        let moves = |i: usize, s: &f64| gain * if i == 1 { s - self.spring_droop } else { *s };
+        let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| moves(i, s)));
         // What the flow moves: the table itself, or the mass on the oil.
         let moved = if has_resonance { 5 } else { 1 };
         let share = if has_resonance {

@@ -366,7 +366,7 @@ impl SimulatedModel for Measured<'_> {
             let (least, most) = self.bounds(i);
             let p = &mut moved.nuisance[place];
             // What is gone stays so.
-            *p = if point.nuisance[place] > GONE {
+            *p = if point.nuisance[place] > GONE || !self.is_logarithmic(i) {
                 p.max(least).min(most)
             } else {
                 GONE
@@ -614,5 +614,55 @@ impl InParts for Measured<'_> {
 
     fn contradictions(&self) -> Vec<Cause> {
         self.rig.contradictions(&self.measurement.recordings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kinds::RigRecording;
+    use recordings::Recording;
+
+    const COMMAND: Channel = Channel::Other {
+        name: "command",
+        unit: "m",
+    };
+
+    #[test]
+    fn a_zero_many_deviations_off_comes_back_and_what_may_be_nothing_does_not() {
+        let rig = crate::kinds::of_kind("closed_loop_actuator").unwrap();
+        let wave: Vec<f64> = (0..600).map(|k| (0.1 * f64::from(k)).sin()).collect();
+        let channels = vec![(COMMAND, wave.clone()), (Channel::Displacement, wave)];
+        let recording = Recording::new("one", 0.01, channels).unwrap();
+        let measurement = Measurement {
+            recordings: vec![RigRecording::new(
+                recording,
+                &[COMMAND],
+                Channel::Displacement,
+            )],
+        };
+        let stated = |name: &str| match name {
+            "loop_gain" => (20.0, 5.0),
+            "integral" => (0.1, 0.1),
+            "offset" => (0.0, 1e-3),
+            _ => (0.0, 0.0),
+        };
+        let nominal = rig.parameters().iter().map(|(name, _)| stated(name));
+        let measured = Measured::new(rig, &measurement, nominal.collect());
+        let names = ["loop_gain", "offset", "integral"];
+        let origin = measured.origin();
+        let values = |point: &Point| measured.parameters(point, &[]);
+        let found: Vec<String> = values(&origin).into_iter().map(|own| own.name).collect();
+        assert_eq!(found, names);
+        let mut step = vec![0.0; origin.nuisance.len()];
+        step[1] = -50.0;
+        let far = measured.moved(&origin, &step);
+        assert!((values(&far)[1].value + 0.05).abs() < 1e-12);
+        step[1] = 20.0;
+        let back = measured.moved(&far, &step);
+        assert!((values(&back)[1].value + 0.03).abs() < 1e-12);
+        let none = measured.without(&origin, 2).unwrap();
+        step[2] = 1.0;
+        assert_eq!(values(&measured.moved(&none, &step))[2].value, 0.0);
     }
 }
