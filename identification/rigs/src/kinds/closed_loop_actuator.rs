@@ -34,7 +34,8 @@ const COMMAND: Channel = Channel::Other {
 /// The loop's gain times a step at most, where it is not linear, and the most steps of a sample.
 const FINE: f64 = 0.25;
 const MOST_STEPS: f64 = 16.0;
-/// Integral below which it does not make up for a spring, and the scale holds what that takes, 1/s.
+/// Integral below which it does not make up for a spring, 1/s: gain and scale are then those of a table that the
+/// spring holds back.
 const SLOW: f64 = 0.1;
 /// The fewest: between samples the command follows a curve, and friction is even over a step.
 const SMOOTH: f64 = 2.0;
@@ -56,7 +57,8 @@ nominal_parameters! {
     feedforward: "1" = 0.0,
     /// i: integral over proportional gain.
     integral: "1/s" = 0.0,
-    /// y: share of the displacement by which a spring under the table holds it back until the integral makes up for it.
+    /// y: share of the displacement by which a spring under the table holds it back, behind whatever bounds the flow, until
+    /// the integral makes up for it.
     spring_droop: "1" = 0.0,
     /// P: one over the angular frequency of the mass on the oil, or of a second lag; 0 for none.
     resonance: "s" = 0.0,
@@ -262,7 +264,7 @@ impl Equations for ClosedLoopActuator {
         out: &mut [f64],
     ) {
         let Nominal {
-            loop_gain: gain,
+            loop_gain,
             command_lag: lag,
             scale,
             offset,
@@ -303,13 +305,17 @@ impl Equations for ClosedLoopActuator {
         };
         let sample = recording.period();
         let delay = (delay + command_delay) / sample;
+        // The spring shows in the steady displacement, as a gain and a scale, or in what the integral makes up for.
+        let idle = SLOW / (integral + SLOW);
+        let held = 1.0 + spring_droop * idle;
+        let gain = loop_gain / held;
         let form = Loop {
             gain,
             command_lag: lag,
             loop_lag: valve + loop_lag,
             feedforward,
             integral,
-            spring_droop: spring_droop * integral / (integral + SLOW),
+            spring_droop,
             resonance,
             resonance_damping,
             rubs: breakaway_error > 0.0,
@@ -333,7 +339,7 @@ impl Equations for ClosedLoopActuator {
             (sample * most / FINE).ceil().clamp(SMOOTH, MOST_STEPS)
         };
         let step = form.step(sample / steps, sample);
-        let at = |place: f64| scale * between(loop_input, place - delay) + offset;
+        let at = |place: f64| held * (scale * between(loop_input, place - delay) + offset);
         let now = Cell::new(0.0);
         // What the flow is beyond that of the linear loop.
         let beyond = |sent: f64| {
@@ -352,7 +358,8 @@ impl Equations for ClosedLoopActuator {
         };
         let beyond = (has_effect || fastest < f64::INFINITY).then_some(&beyond);
         let start = scale * first + offset;
-        let mut state: State = [start, start, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let made_up = spring_droop * (1.0 - idle) * start;
+        let mut state: State = [held * start, start, 0.0, made_up, 0.0, 0.0, 0.0, 0.0];
         let mut shown = state[1];
         let mut begin = at(0.0);
         for (k, y) in out.iter_mut().enumerate() {
@@ -559,14 +566,14 @@ mod tests {
     }
 
     #[test]
-    fn a_spring_under_a_shaker_whose_integral_makes_up_for_it_is_that_of_its_own_equations() {
+    fn a_spring_under_a_shaker_is_that_of_its_own_equations() {
         // L i' = c - R i - b v, m v' = b i - s x, c of proportion and integral up to a rail, by small steps of its own.
         let (mass, resistance, inductance, constant, stiffness) = (20.0, 1.0, 1e-3, 80.0, 9000.0);
-        let (gain, integral) = (30.0, 0.8);
+        let gain = 30.0;
         let (rate, n, steps) = (200.0, 4000, 200);
         let wave = |t: f64| 4e-3 * (1.3 * t).sin() + 2e-3 * (9.0 * t).sin();
         let command: Vec<f64> = (0..n).map(|k| wave(k as f64 / rate)).collect();
-        let measured = |rail: f64| {
+        let measured = |integral: f64, rail: f64| {
             let (mut current, mut x, mut v, mut sum) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
             let h = 1.0 / rate / f64::from(steps);
             let mut measured = Vec::new();
@@ -586,13 +593,16 @@ mod tests {
         };
         let resonance = (mass * inductance).sqrt() / constant;
         let taken = stiffness * resistance / (constant * constant * gain);
-        let off = |spring_droop: f64, rail: f64| {
+        let off = |integral: f64, spring_droop: f64, rail: f64| {
+            // Without an integral the scale and the gain hold what the spring takes.
+            let held = 1.0 + taken * SLOW / (integral + SLOW);
             let nominal = Nominal {
+                scale: 1.0 / held,
                 integral,
                 spring_droop,
                 resonance,
                 resonance_damping: 0.5 * resonance * resistance / inductance,
-                ..proportional(gain)
+                ..proportional(gain * held)
             };
             let limited = SpeedLimit {
                 slowness: constant / rail,
@@ -602,18 +612,20 @@ mod tests {
                 ..Effects::off().unwrap()
             };
             let out = answer(rate, &command, &nominal, &effects);
-            let measured = measured(rail);
+            let measured = measured(integral, rail);
             let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
             let size: f64 = measured.iter().map(|x| x * x).sum();
             (errors.sum::<f64>() / size).sqrt()
         };
 
-        let droop = taken * (integral + SLOW) / integral;
         let [never, often] = [1e6, 0.9];
-        assert!(off(droop, never) < 1e-3, "{}", off(droop, never));
-        assert!(off(0.0, never) > 0.02, "{}", off(0.0, never));
-        assert!(off(droop, often) < 3e-3, "{}", off(droop, often));
-        assert!(off(0.0, often) > 0.02, "{}", off(0.0, often));
+        for integral in [0.0, 0.8] {
+            assert!(off(integral, taken, never) < 1e-3);
+            assert!(off(integral, taken, often) < 3e-3);
+            assert!(off(integral, 0.0, often) > 0.02);
+        }
+        assert!(off(0.8, 0.0, never) > 0.02);
+        assert!(off(0.0, 0.0, never) < 1e-3);
     }
 
     #[test]
