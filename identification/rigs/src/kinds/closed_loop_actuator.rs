@@ -1,9 +1,11 @@
 //! Servo-hydraulic actuator in a closed displacement loop: command to displacement.
 //!
-//! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K - y x`,
-//! `T/2 q' = K c - q`, `T/2 w' = q - w`, `P² v'' + 2 d P v' + v = w`, `x' = v` (Merritt, Hydraulic Control Systems, 1967: a
-//! valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
-//! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. Two lags in a row
+//! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K`,
+//! `T/2 q' = K (c - y x) - q`, `T/2 w' = q - w`, `P² v'' + 2 d P v' + v = w`, `x' = v` (Merritt, Hydraulic Control Systems,
+//! 1967: a valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
+//! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. A spring `y` under the table
+//! without an integral is a larger gain and a smaller scale: as `i` goes to 0, `K` and `g` are those of the table as it
+//! moves, so that `y` shows in what bounds the flow alone. Two lags in a row
 //! are nearer to a spool, and to a coil before a mass, than one and a delay. Between samples
 //! the command follows a curve, of which a step takes the chord. The linear equations are solved exactly, and what is
 //! not linear by steps.
@@ -57,8 +59,7 @@ nominal_parameters! {
     feedforward: "1" = 0.0,
     /// i: integral over proportional gain.
     integral: "1/s" = 0.0,
-    /// y: share of the displacement by which a spring under the table holds it back, behind whatever bounds the flow, until
-    /// the integral makes up for it.
+    /// y: share of the displacement by which a spring under the table holds it back, behind what bounds the flow.
     spring_droop: "1" = 0.0,
     /// P: one over the angular frequency of the mass on the oil, or of a second lag; 0 for none.
     resonance: "s" = 0.0,

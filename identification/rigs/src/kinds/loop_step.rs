@@ -10,7 +10,7 @@ pub(super) struct Loop {
     pub(super) loop_lag: f64,
     pub(super) feedforward: f64,
     pub(super) integral: f64,
-    /// Share of the displacement that a spring takes of the command: before the lags, which are short beside it.
+    /// Share of the displacement that a spring takes of what moves the table: before the lags, which are short beside it.
     pub(super) spring_droop: f64,
     pub(super) resonance: f64,
     pub(super) resonance_damping: f64,
