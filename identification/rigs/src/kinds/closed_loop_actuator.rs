@@ -5,10 +5,9 @@
 //! 1967: a valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
 //! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. A spring `y` under the table
 //! without an integral is a larger gain and a smaller scale: as `i` goes to 0, `K` and `g` are those of the table as it
-//! moves, so that `y` shows in what bounds the flow alone. Two lags in a row
-//! are nearer to a spool, and to a coil before a mass, than one and a delay. Between samples
-//! the command follows a curve, of which a step takes the chord. The linear equations are solved exactly, and what is
-//! not linear by steps.
+//! moves, so that `y` shows in what bounds the flow alone. Two lags in a row are nearer to a spool, and to a coil before
+//! a mass, than one and a delay. Between samples the command follows a curve, of which a step takes the chord. The
+//! linear equations are solved exactly, and what is not linear by steps.
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
@@ -36,11 +35,11 @@ const COMMAND: Channel = Channel::Other {
 /// The loop's gain times a step at most, where it is not linear, and the most steps of a sample.
 const FINE: f64 = 0.25;
 const MOST_STEPS: f64 = 16.0;
+/// The fewest: between samples the command follows a curve, and friction is even over a step.
+const SMOOTH: f64 = 2.0;
 /// Integral below which it does not make up for a spring, 1/s: gain and scale are then those of a table that the
 /// spring holds back.
 const SLOW: f64 = 0.1;
-/// The fewest: between samples the command follows a curve, and friction is even over a step.
-const SMOOTH: f64 = 2.0;
 
 nominal_parameters! {
     /// K: speed over position error.

@@ -150,8 +150,9 @@ impl Loop {
         let column = |i: usize| [0, 1, 2, 3, command, slope, beyond][i];
         let mut a = SMatrix::<f64, ALL, ALL>::zeros();
         // The spring holds the table back behind whatever bounds what is sent.
-        let moves = |i: usize, s: &f64| gain * if i == 1 { s - self.spring_droop } else { *s };
-        let flow: [f64; 7] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| moves(i, s)));
+        let mut moves = sent;
+        moves[1] -= self.spring_droop;
+        let flow: [f64; 7] = std::array::from_fn(|i| moves.get(i).map_or(1.0, |s| gain * s));
         // What the flow moves: the table itself, or the mass on the oil.
         let moved = if has_resonance { 5 } else { 1 };
         let share = if has_resonance {
