@@ -25,6 +25,8 @@ use super::search::{Selection, search};
 const LEAST_DEVIATE: f64 = 3.0;
 /// Share of the squared error below which an effect is not worth a name.
 const LEAST_GAIN: f64 = 0.05;
+/// Factor by which the squared error of the fit grows without an effect that the data cannot do without.
+pub const VITAL: f64 = 4.0;
 /// A candidate that gains this share of what the one taken gains is its rival.
 const RIVAL: f64 = 0.9;
 /// A candidate whose fit gains less than this share of the best one's is not tested on unseen data.
@@ -500,7 +502,10 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
         let (compared, without): (Vec<Inside>, Vec<Simulated>) = all?.into_iter().unzip();
         self.without = without;
         self.deviates = compared.iter().map(|inside| inside.deviate).collect();
+        // Where one half does not determine the model, its prediction is no judge of what all data need.
+        let may_go = |&i: &usize| self.without[i].squares < VITAL * current.squares;
         let least = (0..compared.len())
+            .filter(may_go)
             .min_by(|&a, &b| compared[a].gain.total_cmp(&compared[b].gain))
             .filter(|&i| !compared[i].holds());
         Some(least.map(|i| self.without.swap_remove(i)))

@@ -19,7 +19,7 @@ const BEHIND: f64 = 2.0;
 const LITTLE: f64 = 0.01;
 
 /// What the two parts ask for, each alone and both together, of effects that cannot be told apart one; each also
-/// from the stated values of what vanished in it.
+/// from the stated nominal values.
 pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Vec<Point> {
     let mut all: Vec<Point> = parts.iter().map(|part| part.point.clone()).collect();
     for (one, other) in [(0, 1), (1, 0)] {
@@ -34,8 +34,8 @@ pub(super) fn proposals<M: InParts>(measured: &M, parts: [&PartReport; 2]) -> Ve
             all.push(both);
         }
     }
-    let restored: Vec<Point> = all.iter().map(|own| measured.restored(own)).collect();
-    all.extend(restored);
+    let stated: Vec<Point> = all.iter().map(|own| measured.as_stated(own)).collect();
+    all.extend(stated);
     all
 }
 

@@ -12,8 +12,8 @@ use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
 use diagnosis::{
-    AGAIN, Candidate, Free, Point, Role, all_errors, completed, estimates, least_squares, looked,
-    refit, settled, squares,
+    AGAIN, Candidate, Free, Point, Role, VITAL, all_errors, completed, estimates, least_squares,
+    looked, refit, settled, squares,
 };
 use recordings::mean_and_deviation;
 
@@ -24,8 +24,6 @@ const DIFFERS: f64 = 3.5;
 const SURPRISING: f64 = 3.0;
 /// Share of the least size worth a name below which an effect has none.
 const LEAST: f64 = 0.5;
-/// Factor by which the squared error on all data grows without an effect that one part of them need not show.
-const VITAL: f64 = 4.0;
 /// Why an effect is not named of which models that do as well have none.
 const UNKNOWN: &str = "its size differs so much between models that explain the data as well that the 95 % \
                        interval contains zero";

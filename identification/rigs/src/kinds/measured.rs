@@ -13,9 +13,8 @@ const CHEAP: usize = 40_000;
 /// Logarithm, in deviations, of a nominal parameter that is none: nothing depends on it any more.
 const GONE: f64 = -40.0;
 
-/// Logarithm of the share of what was stated below which a nominal parameter has vanished.
-const VANISHED: f64 = -5.0;
-/// The least of it for a parameter that may be nothing: with less a fit does not find it again.
+/// Logarithm of the share of what was stated that is the least of a nominal parameter that may be nothing: with less a
+/// fit does not find it again.
 const LEAST: f64 = -7.0;
 
 /// Error over the output's deviation from which on fits begin from what is read off as well.
@@ -598,18 +597,10 @@ impl InParts for Measured<'_> {
         (may_be_nothing && point.nuisance[i] > GONE).then_some(without)
     }
 
-    fn restored(&self, point: &Point) -> Point {
-        let mut restored = point.clone();
-        for (place, &i) in self.uncertain.iter().enumerate() {
-            let (value, deviation) = self.nominal[i];
-            let has_vanished = restored.nuisance[place] * deviation / value < VANISHED;
-            if self.is_logarithmic(i) && has_vanished
-                || !self.is_logarithmic(i) && self.is_cause(place)
-            {
-                restored.nuisance[place] = 0.0;
-            }
-        }
-        restored
+    fn as_stated(&self, point: &Point) -> Point {
+        let mut stated = point.clone();
+        stated.nuisance[..self.uncertain.len()].fill(0.0);
+        stated
     }
 
     fn contradictions(&self) -> Vec<Cause> {

@@ -161,9 +161,9 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         None
     }
 
-    /// `point` with the nominal parameters as stated that vanished, from where no fit comes back, and with those
-    /// that are causes of their own.
-    fn restored(&self, point: &Point) -> Point {
+    /// `point` with the nominal parameters as stated: where they make up for each other, a fit that went the wrong way
+    /// does not come back.
+    fn as_stated(&self, point: &Point) -> Point {
         point.clone()
     }
 
