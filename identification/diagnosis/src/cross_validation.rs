@@ -6,6 +6,8 @@
 //! chance, with correlated samples counted once. Backward at the end by the same test. Every model
 //! in every comparison is the least-squares one ([`super::least_squares`]).
 
+use std::collections::BTreeSet;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -51,6 +53,8 @@ const LOOK: usize = 6;
 const TO_THE_END: usize = 40;
 /// Steps of a fit that begins near its end.
 pub const AGAIN: usize = 12;
+/// Squared error of a model after those, over its least from another start, beyond which it does not become the best.
+const NEAR: f64 = 4.0;
 
 /// A model fitted to a part.
 #[derive(Debug, Clone)]
@@ -575,9 +579,30 @@ pub fn select_jointly<M: SimulatedModel>(
     observer: Observer<'_>,
 ) -> Option<Simulated> {
     let mut selection = CrossValidation::new(model, record, observer);
-    let fitted = proposals.iter().filter_map(|start| {
+    let effects = |point: &Point| -> BTreeSet<usize> {
+        let all = point.effects.iter();
+        all.map(|(i, _)| *i).collect()
+    };
+    // Of a model from several starts the best fit.
+    let mut models: Vec<Simulated> = Vec::new();
+    for start in proposals {
         observer.tell(|| Progress::Fitting(model.record_name(record).to_owned()));
-        let fitted = settle(model, start, record, TO_THE_END)?;
+        let to_the_end = |start: &Point| settle(model, start, record, TO_THE_END);
+        let mut known = models
+            .iter_mut()
+            .filter(|own| effects(&own.point) == effects(start));
+        let Some(known) = known.next() else {
+            models.extend(to_the_end(start));
+            continue;
+        };
+        let near = settle(model, start, record, AGAIN);
+        let near = near.filter(|near| near.squares < NEAR * known.squares);
+        let other = near.and_then(|near| to_the_end(&near.point));
+        if let Some(other) = other.filter(|other| other.squares < known.squares) {
+            *known = other;
+        }
+    }
+    let fitted = models.into_iter().filter_map(|fitted| {
         let crossed = selection.crossed(&fitted)?;
         // Either half counts alike, whatever its size; a model of data without noise may leave nothing.
         let left: f64 = crossed.iter().map(|half| squares(half).ln()).sum();
