@@ -623,7 +623,7 @@ pub fn select_jointly<M: SimulatedModel>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Candidate;
+    use crate::{Candidate, EffectParameter, Role, Scale};
 
     /// A swing whose frequency grows with its amplitude `p[0]`, by which a record begins; the later half of the
     /// record is of a motion that has forgotten it.
@@ -691,5 +691,132 @@ mod tests {
         assert!((found.nuisance[0].abs() - 0.3).abs() < 1e-3, "{found:?}");
         // What the fit did see stays.
         assert_eq!(completed(&model, &begun(5.4), Some(0), 1), begun(5.4));
+    }
+
+    #[test]
+    fn a_model_begins_from_the_best_of_its_starts_whichever_comes_first() {
+        let model = Swing((0..SAMPLES).map(|k| swing(0.3, k)).collect());
+        let begun = |begin: f64| Point {
+            nuisance: vec![begin],
+            effects: Vec::new(),
+        };
+        for starts in [[5.4, 0.2], [0.2, 5.4]] {
+            let found = select_jointly(&model, &starts.map(begun), 0, Observer::none()).unwrap();
+            assert!(
+                (found.point.nuisance[0].abs() - 0.3).abs() < 1e-3,
+                "{found:?}"
+            );
+        }
+    }
+
+    /// `y = a x + c z` of two halves. In the second one x and z hardly differ, and what else is in it is as what they
+    /// differ by.
+    struct Halves {
+        candidates: Vec<Candidate>,
+    }
+
+    impl Halves {
+        const APART: f64 = 0.01;
+
+        /// x, z and what else is measured.
+        fn at(half: usize, k: usize) -> [f64; 3] {
+            let t = k as f64 / 10.0;
+            let (x, other) = (t.sin(), (2.3 * t).sin());
+            if half == 0 {
+                [x, other, 0.0]
+            } else {
+                let apart = Self::APART * other;
+                [x, x + apart, 2.0 * apart]
+            }
+        }
+    }
+
+    impl SimulatedModel for Halves {
+        fn nuisance(&self) -> usize {
+            1
+        }
+        fn candidates(&self) -> &[Candidate] {
+            &self.candidates
+        }
+        fn blocks(&self) -> usize {
+            1
+        }
+        fn block_of(&self, _: usize) -> Option<usize> {
+            None
+        }
+        fn samples(&self, record: usize, _: usize) -> usize {
+            if record == 2 { 2 * SAMPLES } else { SAMPLES }
+        }
+        fn errors(&self, point: &Point, record: usize, _: usize) -> Vec<f64> {
+            let (a, effect) = (point.nuisance[0], point.effects.first());
+            let c = effect.map_or(0.0, |(_, q)| q[0]);
+            let halves = if record == 2 {
+                0..2
+            } else {
+                record..record + 1
+            };
+            let all = halves.flat_map(|half| (0..SAMPLES).map(move |k| Self::at(half, k)));
+            all.map(|[x, z, more]| (1.0 - a) * x + (1.0 - c) * z + more)
+                .collect()
+        }
+        fn folds(&self, _: usize) -> [usize; 2] {
+            [0, 1]
+        }
+        fn screen(&self, record: usize) -> usize {
+            record
+        }
+        fn held(&self) -> Self {
+            Self {
+                candidates: self.candidates.clone(),
+            }
+        }
+        fn record_name(&self, _: usize) -> &str {
+            "halves"
+        }
+    }
+
+    #[test]
+    fn an_effect_that_all_data_need_stays_where_one_half_does_not_determine_it() {
+        let model = Halves {
+            candidates: vec![Candidate {
+                effect: "other",
+                parameters: vec![EffectParameter {
+                    name: "size",
+                    unit: "1",
+                    scale: Scale::Linear(1.0),
+                    role: Role::Size { weak: 0.1 },
+                    bounds: (-50.0, 50.0),
+                }],
+                starts: vec![vec![0.5]],
+                look_alikes: &[],
+                tolerance: 1.0,
+                contains: None,
+                law: "",
+                is_linear: false,
+            }],
+        };
+        let start = Point {
+            nuisance: vec![0.5],
+            effects: vec![(0, vec![0.5])],
+        };
+        let selection = CrossValidation::new(&model, 2, Observer::none());
+        let with = settle(&model, &start, 2, TO_THE_END).unwrap();
+        let bare = settle(
+            &model,
+            &Point {
+                effects: Vec::new(),
+                ..start.clone()
+            },
+            2,
+            TO_THE_END,
+        );
+        let [with, bare] = [with, bare.unwrap()].map(|own| selection.crossed(&own).unwrap());
+        assert!(
+            compare(&bare, &with).gain < -1.0,
+            "the halves tell the effect"
+        );
+        let found = select_jointly(&model, &[start], 2, Observer::none()).unwrap();
+        let size = found.point.effects.first().map(|(_, q)| q[0]);
+        assert!((size.unwrap() - 1.0).abs() < 0.05, "{found:?}");
     }
 }

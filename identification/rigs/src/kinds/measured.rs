@@ -652,6 +652,16 @@ mod tests {
         step[1] = 20.0;
         let back = measured.moved(&far, &step);
         assert!((values(&back)[1].value + 0.03).abs() < 1e-12);
+        // What differs from file to file stays as it is there.
+        let mut later = far.clone();
+        *later.nuisance.last_mut().unwrap() = 3.0;
+        let stated = measured.as_stated(&later);
+        let same = values(&stated).into_iter().zip(values(&origin));
+        assert!(
+            same.into_iter()
+                .all(|(own, as_stated)| own.value == as_stated.value)
+        );
+        assert_eq!(stated.nuisance.last(), Some(&3.0));
         let none = measured.without(&origin, 2).unwrap();
         step[2] = 1.0;
         assert_eq!(values(&measured.moved(&none, &step))[2].value, 0.0);
