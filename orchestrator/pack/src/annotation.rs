@@ -49,3 +49,26 @@ pub(super) fn escape(text: &str) -> String {
         .replace('>', "&gt;")
         .replace('"', "&quot;")
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_description_says_by_which_build_it_was_made() {
+        let text = "<fmiModelDescription>\n  <ModelVariables/>\n</fmiModelDescription>\n";
+        for version in [FmiVersion::V2, FmiVersion::V3] {
+            for build in [Some("1a2b & <\"dirty\">"), None] {
+                let said = annotated(text, version, build);
+                let document = Document::parse(&said).unwrap();
+                assert_eq!(build_of(&document).as_deref(), build, "{said}");
+                let mut all = document.descendants();
+                let release = all.find(|node| node.has_tag_name("Release")).unwrap();
+                assert_eq!(release.attribute("version"), Some(VERSION));
+                assert!(said.contains("  <ModelVariables/>"), "{said}");
+            }
+        }
+        assert_eq!(build_of(&Document::parse(text).unwrap()), None);
+    }
+}

@@ -13,8 +13,9 @@ const CHEAP: usize = 40_000;
 /// Logarithm, in deviations, of a nominal parameter that is none: nothing depends on it any more.
 const GONE: f64 = -40.0;
 
-/// Logarithm of the share of what was stated that is the least of a nominal parameter that may be nothing: with less a
-/// fit does not find it again.
+/// Logarithm of the share of what was stated below which a nominal parameter has vanished.
+const VANISHED: f64 = -5.0;
+/// The least of it for a parameter that may be nothing: with less a fit does not find it again.
 const LEAST: f64 = -7.0;
 
 /// Error over the output's deviation from which on fits begin from what is read off as well.
@@ -601,6 +602,20 @@ impl InParts for Measured<'_> {
         let mut stated = point.clone();
         stated.nuisance[..self.uncertain.len()].fill(0.0);
         stated
+    }
+
+    fn restored(&self, point: &Point) -> Point {
+        let mut restored = point.clone();
+        for (place, &i) in self.uncertain.iter().enumerate() {
+            let (value, deviation) = self.nominal[i];
+            let has_vanished = restored.nuisance[place] * deviation / value < VANISHED;
+            if self.is_logarithmic(i) && has_vanished
+                || !self.is_logarithmic(i) && self.is_cause(place)
+            {
+                restored.nuisance[place] = 0.0;
+            }
+        }
+        restored
     }
 
     fn contradictions(&self) -> Vec<Cause> {

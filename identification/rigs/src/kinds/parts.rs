@@ -167,6 +167,12 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         point.clone()
     }
 
+    /// `point` with the nominal parameters as stated that vanished, from where no fit comes back, and with those
+    /// that are causes of their own.
+    fn restored(&self, point: &Point) -> Point {
+        point.clone()
+    }
+
     /// Sensors that contradict each other.
     fn contradictions(&self) -> Vec<Cause> {
         Vec::new()

@@ -7,6 +7,8 @@ use super::parts::{EVERYTHING, InParts};
 use super::readings::NEEDED;
 use diagnosis::{Point, all_errors, settled, squares};
 
+/// Share of the errors' power that is not white noise from which on a model is not exact.
+const INEXACT: f64 = 0.5;
 /// Values that are tried to either side.
 const TRIES: usize = 4;
 /// Share of a distance to which its end is found.
@@ -46,18 +48,28 @@ pub(super) struct Profiled<'a, M> {
     lengths: Vec<usize>,
 }
 
-/// The fit beside the model at `point`, also of what that model goes without. None where nothing can be fitted.
+/// The fit beside the model at `point`, also of what that model goes without if noise is not most of its error. None
+/// where nothing can be fitted.
 pub(super) fn beside<'a, M: InParts>(measured: &'a M, point: &Point) -> Option<Profiled<'a, M>> {
     let fitted = |start: &Point| {
         let best = settled(measured, start, EVERYTHING)?;
         Some((all_errors(measured, &best, EVERYTHING), best))
     };
-    let starts = [point.clone(), measured.as_stated(point)];
-    let fits = starts.par_iter().filter_map(fitted);
-    let (errors, best) = fits.min_by(|a, b| squares(&a.0).total_cmp(&squares(&b.0)))?;
+    let (mut errors, mut best) = fitted(point)?;
+    let mut starts = vec![point.clone()];
+    // Where noise is all that is left, what the model goes without is not there.
+    if coloured(&errors) > INEXACT {
+        let restored = measured.restored(point);
+        if let Some(full) = fitted(&restored)
+            && squares(&full.0) < squares(&errors)
+        {
+            (errors, best) = full;
+        }
+        starts.push(restored);
+    }
     Some(Profiled {
         measured,
-        starts: starts.into(),
+        starts,
         best,
         allowed: 1.0 + (NEEDED - 1.0) * coloured(&errors),
         errors,

@@ -52,3 +52,27 @@ pub fn last_left(mut rows: Vec<Vec<String>>) -> String {
         .map(|(line, last)| format!("{line:<full$}  {last}").trim_end().to_string() + "\n")
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(text: &str) -> Vec<Vec<String>> {
+        let rows = text.lines();
+        rows.map(|row| row.split('|').map(str::to_string).collect())
+            .collect()
+    }
+
+    #[test]
+    fn numbers_end_in_line_and_words_at_the_end_begin_there() {
+        let table = "name|value|unit\nloop gain|9.5|1/s\nlag|120|ms";
+        assert_eq!(
+            aligned(&rows(table)),
+            "name       value  unit\nloop gain    9.5   1/s\nlag          120    ms\n"
+        );
+        assert_eq!(
+            last_left(rows(table)),
+            "name       value  unit\nloop gain  9.5    1/s\nlag        120    ms\n"
+        );
+    }
+}

@@ -337,6 +337,61 @@ mod tests {
     use super::*;
 
     #[test]
+    fn ticks_are_round_numbers_within_the_limits() {
+        let scale = |logarithmic, [low, high]: [f64; 2]| Scale {
+            unit: 1.0,
+            logarithmic,
+            low,
+            high,
+            from: 0.0,
+            to: 100.0,
+        };
+        let ticks = |scale: Scale| -> Vec<(i64, String)> {
+            let all = scale.ticks().into_iter();
+            all.map(|(place, label)| (place.round() as i64, label))
+                .collect()
+        };
+        let expected = |all: &[(i64, &str)]| -> Vec<(i64, String)> {
+            let all = all.iter();
+            all.map(|(place, label)| (*place, (*label).to_string()))
+                .collect()
+        };
+        assert_eq!(
+            ticks(scale(false, [-0.2, 0.39])),
+            expected(&[
+                (0, "\u{2212}0.2"),
+                (17, "\u{2212}0.1"),
+                (34, "0.0"),
+                (51, "0.1"),
+                (68, "0.2"),
+                (85, "0.3"),
+            ])
+        );
+        assert_eq!(
+            ticks(scale(true, [-1.0, 1.0])),
+            expected(&[
+                (0, "0.1"),
+                (15, "0.2"),
+                (35, "0.5"),
+                (50, "1"),
+                (65, "2"),
+                (85, "5"),
+                (100, "10"),
+            ])
+        );
+        assert_eq!(
+            ticks(scale(true, [0.0, 4.0])),
+            expected(&[
+                (0, "1"),
+                (25, "10"),
+                (50, "100"),
+                (75, "1000"),
+                (100, "10000")
+            ])
+        );
+    }
+
+    #[test]
     fn no_two_ticks_have_the_same_label() {
         for (low, high, logarithmic) in [
             (0.0, 1.0, false),
