@@ -117,6 +117,15 @@ pub fn settled<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Op
     least_squares(model, start, record, &Free::All, TO_THE_END).map(|found| found.point)
 }
 
+/// `point` with the nuisance as stated but for what differs from block to block.
+pub fn as_stated<M: SimulatedModel>(model: &M, point: &Point) -> Point {
+    let mut stated = point.clone();
+    for (i, p) in stated.nuisance.iter_mut().enumerate() {
+        *p = if model.block_of(i).is_some() { *p } else { 0.0 };
+    }
+    stated
+}
+
 /// As [`settled`], in a few steps: what is far from the end then is of no use.
 pub fn looked<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Option<Point> {
     least_squares(model, start, record, &Free::All, AGAIN).map(|found| found.point)
@@ -338,10 +347,7 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         let candidates = model.candidates();
         // A model without an effect bends its parameters towards it: from the stated ones the way to
         // the right effect may be straighter.
-        let mut stated = base.point.clone();
-        for (i, p) in stated.nuisance.iter_mut().enumerate() {
-            *p = if model.block_of(i).is_some() { *p } else { 0.0 };
-        }
+        let stated = as_stated(model, &base.point);
         let bases: Vec<(Point, Columns)> = [base.point.clone(), stated]
             .into_par_iter()
             .filter_map(|point| {
@@ -588,10 +594,8 @@ pub fn select_jointly<M: SimulatedModel>(
     for start in proposals {
         observer.tell(|| Progress::Fitting(model.record_name(record).to_owned()));
         let to_the_end = |start: &Point| settle(model, start, record, TO_THE_END);
-        let mut known = models
-            .iter_mut()
-            .filter(|own| effects(&own.point) == effects(start));
-        let Some(known) = known.next() else {
+        let mut models_so_far = models.iter_mut();
+        let Some(known) = models_so_far.find(|own| effects(&own.point) == effects(start)) else {
             models.extend(to_the_end(start));
             continue;
         };

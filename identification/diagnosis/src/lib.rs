@@ -15,7 +15,7 @@ mod verdict;
 
 pub use adequacy::{Part, Place, Test};
 pub use cross_validation::{
-    AGAIN, Rival, Selected, Simulated, VITAL, completed, looked, nominal, refit, select,
+    AGAIN, Rival, Selected, Simulated, VITAL, as_stated, completed, looked, nominal, refit, select,
     select_jointly, settled,
 };
 pub use fit::{Fit, Jacobian, evaluate, residuals};

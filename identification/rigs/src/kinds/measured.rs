@@ -599,9 +599,7 @@ impl InParts for Measured<'_> {
     }
 
     fn as_stated(&self, point: &Point) -> Point {
-        let mut stated = point.clone();
-        stated.nuisance[..self.uncertain.len()].fill(0.0);
-        stated
+        diagnosis::as_stated(self, point)
     }
 
     fn restored(&self, point: &Point) -> Point {
