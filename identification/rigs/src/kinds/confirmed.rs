@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::alternatives::{alike, in_place_of};
 use super::cause::{INTERVAL_95, measure};
 use super::named_value::NamedValue;
-use super::parts::{EVERYTHING, InParts, Part, file};
+use super::parts::{EVERYTHING, InParts, LOST, Part, file};
 use super::readings::NEEDED;
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
@@ -17,6 +17,10 @@ use diagnosis::{
 };
 use recordings::mean_and_deviation;
 
+/// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times
+/// these, or this small.
+const AGREE: f64 = 2.0;
+const NEAR: f64 = 0.01;
 /// A parameter differs between parts where its estimates lie this many of their standard errors
 /// apart. Some twenty are compared.
 const DIFFERS: f64 = 3.5;
@@ -232,6 +236,32 @@ fn is_silent<M: InParts>(measured: &M, fits: &Fits, effect: usize, part: Part) -
         Some(!needed(&held.errors, &bare, &lengths))
     };
     is_vital(measured, all, effect) && is_as_good() == Some(true)
+}
+
+/// Whether an error on data that were not fitted agrees with that of a fit to them.
+pub(super) fn agrees(error: f64, fitted: f64) -> bool {
+    error < LOST && (error < NEAR || error < AGREE * fitted)
+}
+
+/// The model `own`, fitted to `part`, where it predicts the other part. A part that does not tell a parameter may
+/// fit its own scatter with it and lose the other part altogether: where the model of `all` data serves it about
+/// as well, it contradicts nothing of it.
+pub(super) fn on_the_other<M: InParts>(
+    measured: &M,
+    all: impl FnOnce() -> Option<Point>,
+    own: &Point,
+    part: Part,
+) -> Point {
+    let (fitted, other) = (part as usize, part.other() as usize);
+    let used = completed(measured, own, Some(fitted), other);
+    if measured.normalised_error(&used, other) < LOST {
+        return used;
+    }
+    let serves = |all: &Point| {
+        let [error, own] = [all, own].map(|point| measured.normalised_error(point, fitted));
+        agrees(error, own)
+    };
+    all().filter(serves).unwrap_or(used)
 }
 
 /// Samples of each file in `record`, of those that have some.
@@ -466,10 +496,19 @@ pub(super) fn confirm<M: InParts>(
     });
     let clear = clear.map(|((i, _), _)| *i).collect();
     let on = |part: Part| {
-        let (own, other) = (part as usize, part.other() as usize);
-        completed(measured, &fits.parts[own].0, Some(own), other)
+        let all = || Some(point.clone());
+        on_the_other(measured, all, &fits.parts[part as usize].0, part)
     };
     let (here, there) = (on(Part::Fitted), on(Part::LeftOut));
+    for (part, used) in [(Part::Fitted, &here), (Part::LeftOut, &there)] {
+        if used == point {
+            findings.push(format!(
+                "the fit to `{}` alone loses the other part; the model of all data, which serves it about as well, \
+                 takes its place",
+                measured.record_name(part as usize)
+            ));
+        }
+    }
     let (tested, swapped) = (Part::LeftOut as usize, Part::Fitted as usize);
     let gain = |part: Part, own: &Point| {
         let (fitted, tested) = (part as usize, part.other() as usize);
@@ -604,9 +643,12 @@ fn surprises<M: InParts>(
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
+    use super::super::measured::Measured;
+    use super::super::{Measurement, RigRecording, of_kind};
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+    use recordings::{Channel, Recording};
 
     #[test]
     fn a_gain_all_along_is_clear_and_one_by_chance_or_of_a_slow_drift_is_not() {
@@ -693,27 +735,29 @@ mod tests {
         assert_eq!(gone([0.43, 2.2e-5, 1e-3]), ["flow_saturation"]);
     }
 
-    #[test]
-    fn of_the_first_files_zero_no_later_file_tells() {
-        use super::super::measured::Measured;
-        use super::super::{Measurement, RigRecording, of_kind};
-        use recordings::{Channel, Recording};
-        const COMMAND: Channel = Channel::Other {
-            name: "command",
-            unit: "m",
-        };
-        let rig = of_kind("closed_loop_actuator").unwrap();
-        let recordings = [false, true].map(|is_left_out| {
-            let wave: Vec<f64> = (0..600).map(|k| (0.1 * f64::from(k)).sin()).collect();
-            let channels = vec![(COMMAND, wave.clone()), (Channel::Displacement, wave)];
+    const COMMAND: Channel = Channel::Other {
+        name: "command",
+        unit: "m",
+    };
+
+    /// Two files of command and displacement at 100 Hz, the second left out.
+    fn two_files(files: [(Vec<f64>, Vec<f64>); 2]) -> Measurement {
+        let recordings = files.into_iter().enumerate();
+        let recordings = recordings.map(|(i, (command, displacement))| {
+            let channels = vec![(COMMAND, command), (Channel::Displacement, displacement)];
             let recording = Recording::new("one", 0.01, channels).unwrap();
             let mut own = RigRecording::new(recording, &[COMMAND], Channel::Displacement);
-            own.left_out.fill(is_left_out);
+            own.left_out.fill(i == 1);
             own
         });
-        let measurement = Measurement {
-            recordings: recordings.into(),
-        };
+        Measurement {
+            recordings: recordings.collect(),
+        }
+    }
+
+    /// A closed loop of which gain, scale and zero are uncertain.
+    fn measured(measurement: &Measurement) -> Measured<'_> {
+        let rig = of_kind("closed_loop_actuator").unwrap();
         let stated = |name: &str| match name {
             "loop_gain" => (20.0, 5.0),
             "scale" => (1.0, 0.01),
@@ -721,7 +765,51 @@ mod tests {
             _ => (0.0, 0.0),
         };
         let nominal = rig.parameters().iter().map(|(name, _)| stated(name));
-        let measured = Measured::new(rig, &measurement, nominal.collect());
+        Measured::new(rig, measurement, nominal.collect())
+    }
+
+    #[test]
+    fn a_part_that_does_not_tell_a_gain_keeps_that_of_all_data() {
+        // x' = 20 (r - x) by small steps, at 30 rad/s and so slowly that any gain follows.
+        let file = |frequency: f64| {
+            let wave = |t: f64| (frequency * t).sin();
+            let (mut x, mut displacement) = (0.0, Vec::new());
+            for k in 0..600 {
+                displacement.push(x);
+                for part in 0..100 {
+                    let t = 0.01 * (f64::from(k) + 0.01 * f64::from(part));
+                    x += 1e-4 * 20.0 * (wave(t) - x);
+                }
+            }
+            let command = (0..600).map(|k| wave(0.01 * f64::from(k))).collect();
+            (command, displacement)
+        };
+        let measurement = two_files([file(30.0), file(0.5)]);
+        let measured = measured(&measurement);
+        let all = measured.origin();
+        let at = |gain: f64| {
+            let mut point = all.clone();
+            point.nuisance[0] = (gain / 20.0).ln() * 20.0 / 5.0;
+            point
+        };
+        let (own, near) = (at(4.0), at(18.0));
+        let of_all = |point: &Point| {
+            let point = point.clone();
+            || Some(point)
+        };
+        let used = |of: &Point, own: &Point, part| on_the_other(&measured, of_all(of), own, part);
+        let gain = |point: &Point| point.nuisance[0];
+        assert_eq!(gain(&used(&all, &own, Part::LeftOut)), gain(&all));
+        // What predicts the other part counts as it is, and a model that the part contradicts does not stand for it.
+        assert_eq!(gain(&used(&all, &near, Part::LeftOut)), gain(&near));
+        assert_eq!(gain(&used(&at(0.1), &own, Part::LeftOut)), gain(&own));
+    }
+
+    #[test]
+    fn of_the_first_files_zero_no_later_file_tells() {
+        let wave: Vec<f64> = (0..600).map(|k| (0.1 * f64::from(k)).sin()).collect();
+        let measurement = two_files([(wave.clone(), wave.clone()), (wave.clone(), wave)]);
+        let measured = measured(&measurement);
         let all = measured.origin();
         let mut later = all.clone();
         later.nuisance.iter_mut().for_each(|p| *p = 2.0);

@@ -9,7 +9,7 @@ use super::alternatives::{
 };
 use super::cause::{Cause, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
-    Confirmed, NominalFits, Refused, TOO_SMALL, confirm, effects as named_values, is_vital,
+    Confirmed, NominalFits, Refused, TOO_SMALL, agrees, confirm, effects as named_values, is_vital,
     lengths, needed, unfit,
 };
 use super::measured::Measured;
@@ -25,10 +25,6 @@ use diagnosis::{
     settled, squares,
 };
 
-/// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times
-/// these, or this small.
-const AGREE: f64 = 2.0;
-const NEAR: f64 = 0.01;
 /// Share of the described model's error that is left, in both parts, where a nominal parameter that is so many
 /// standard errors from what was stated is a cause although the errors do not agree.
 const MOST: f64 = 0.5;
@@ -182,6 +178,10 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             .collect()
     };
     let (here, there) = (list(&as_described), list(&swapped));
+    // What rivals an effect is told by the part that asks for it.
+    let own = swapped.rivals.iter();
+    let own = own.filter(|(_, against)| !here.contains(against));
+    as_described.rivals.extend(own.cloned());
     // Effects that records of a rig cannot tell apart confirm each other.
     let alike = |name: &str, other: &str| {
         let known = |name: &str| measured.index(name);
@@ -371,7 +371,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     ];
     let holds = tests
         .into_iter()
-        .all(|(error, fitted)| error < LOST && (error < NEAR || error < AGREE * fitted));
+        .all(|(error, fitted)| agrees(error, fitted));
     // Where they do not agree so well, since friction or the like is missed, what either part predicts of
     // the other still shows a zero or a delay that is far from what was stated in both.
     let explains = [
@@ -658,7 +658,6 @@ impl RigDiagnosis {
     }
 
     fn named_in_words(&self) -> String {
-        let listed = |names: &[String]| names.join(", ").replace('_', " ");
         let effects = self.confirmed.effects.iter();
         let with_values: Vec<String> = effects
             .map(|(name, values)| {
@@ -720,14 +719,17 @@ impl RigDiagnosis {
                     [] => String::new(),
                     some => format!("{}; ", joined(some)),
                 };
-                let rivals = part.rivals.iter();
-                let rivals: Vec<String> = rivals
-                    .map(|(rival, against)| format!("{rival} instead of {against}"))
-                    .collect();
+                let mut rivals: Vec<String> = Vec::new();
+                for (own, _) in &self.confirmed.effects {
+                    let all: Vec<String> = self.rivals_of(own).map(str::to_owned).collect();
+                    if !all.is_empty() {
+                        rivals.push(format!("{} instead of {own}", all.join(" or ")));
+                    }
+                }
                 format!(
                     "{name}: {causes}{}, and {} explains it nearly as well; {falls}.",
                     shown.join(" and "),
-                    listed(&rivals)
+                    joined(&rivals).replace('_', " ")
                 )
             }
             Verdict::Unexplained if part.effects.is_empty() && self.swapped.effects.is_empty() => {

@@ -4,11 +4,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::cause::{Cause, effect_in_words, joined};
-use super::confirmed::{clearly_better, effects, lengths};
+use super::confirmed::{clearly_better, effects, lengths, on_the_other};
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, Part};
 use diagnosis::resampling::correlation_time;
-use diagnosis::{Point, all_errors, completed, looked, refit, settled, squares};
+use diagnosis::{Point, all_errors, looked, refit, settled, squares};
 
 /// The squared error grows by this factor at least without what the data need.
 pub(super) const NEEDED: f64 = 1.1;
@@ -46,26 +46,34 @@ pub(super) struct Crossed {
     lengths: [Vec<usize>; 2],
     /// Where the model is, fitted to the part that is not predicted.
     points: [Point; 2],
+    /// Where it began.
+    start: Point,
 }
 
 impl Crossed {
     /// Of the model at `point`, fitted to either part; none where it cannot be.
     pub(super) fn of<M: InParts>(model: &M, point: &Point) -> Option<Self> {
-        Self::from(model, [point, point], settled)
+        Self::from(model, point, [point, point], settled)
     }
 
     /// As [`Self::of`], of fits in a few steps.
     pub(super) fn looked<M: InParts>(model: &M, point: &Point) -> Option<Self> {
-        Self::from(model, [point, point], looked)
+        Self::from(model, point, [point, point], looked)
     }
 
     /// The same with its fits ended.
     pub(super) fn settled<M: InParts>(&self, model: &M) -> Option<Self> {
-        Self::from(model, [&self.points[0], &self.points[1]], settled)
+        Self::from(
+            model,
+            &self.start,
+            [&self.points[0], &self.points[1]],
+            settled,
+        )
     }
 
     fn from<M: InParts>(
         model: &M,
+        start: &Point,
         starts: [&Point; 2],
         fit: impl Fn(&M, &Point, usize) -> Option<Point>,
     ) -> Option<Self> {
@@ -75,17 +83,15 @@ impl Crossed {
             fit(model, starts[1], tested[0] as usize)?,
         ];
         let errors = |i: usize| {
-            let (own, other) = (tested[1 - i] as usize, tested[i] as usize);
-            all_errors(
-                model,
-                &completed(model, &points[i], Some(own), other),
-                other,
-            )
+            let all = || settled(model, start, EVERYTHING);
+            let used = on_the_other(model, all, &points[i], tested[1 - i]);
+            all_errors(model, &used, tested[i] as usize)
         };
         Some(Self {
             errors: [errors(0), errors(1)],
             lengths: tested.map(|part| lengths(model, part as usize)),
             points,
+            start: start.clone(),
         })
     }
 
@@ -227,10 +233,8 @@ mod tests {
         Crossed {
             errors,
             lengths: [vec![2000], vec![2000]],
-            points: [(); 2].map(|()| Point {
-                nuisance: Vec::new(),
-                effects: Vec::new(),
-            }),
+            start: Point::default(),
+            points: [Point::default(), Point::default()],
         }
     }
 
