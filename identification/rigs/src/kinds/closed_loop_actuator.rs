@@ -18,7 +18,7 @@ use units::vocabulary;
 use super::between::between;
 use super::hypotheses::Inside;
 use super::linear_loop::LinearLoop;
-use super::loop_step::{Course, Loop, State, rubbing, tanh};
+use super::loop_step::{Course, Law, Loop, Rubbing, State, tanh};
 use super::sensors::accelerometer_scale;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
 use super::{Begun, Cause, Equations, INTERVAL_95, NamedValue, Natural, RigRecording};
@@ -82,7 +82,13 @@ effects! {
     friction: Friction {
         breakaway_error: size("m", 3e-3, (0.0, 3.0)),
         sliding_speed: shape("m/s", 0.02, 1.0),
-    } from [[0.02, 0.02], [0.1, 0.05]], like [vocabulary::DEAD_BAND, "reduced_null_gain"];
+    } from [[0.02, 0.02], [0.1, 0.05]], like [vocabulary::DEAD_BAND, "reduced_null_gain", "bristle_friction"];
+    /// Friction as [`Friction`], of bristles that bend before they slide: `z' = v / d (1 - z sgn v)` in the place of the
+    /// tanh (Dahl 1968; Canudas de Wit and others, IEEE Transactions on Automatic Control 40, 1995).
+    bristle_friction: BristleFriction {
+        breakaway_error: size("m", 3e-3, (0.0, 3.0)),
+        deflection: shape("m", 0.01, 0.5),
+    } from [[0.01, 0.005], [0.05, 0.02]], like [vocabulary::DEAD_BAND, "reduced_null_gain", "friction", "free_play"];
     /// Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
     dead_band: DeadBand {
         half_width: size("m", 3e-3, (0.0, 3.0)),
@@ -92,7 +98,7 @@ effects! {
     reduced_null_gain: ReducedNullGain {
         reduction: size("1", 0.05, (-1.0, 1.0)),
         width: shape("m", 0.1, 1.0),
-    } from [[0.4, 0.1], [-0.3, 0.1]], like [vocabulary::DEAD_BAND, "friction"];
+    } from [[0.4, 0.1], [-0.3, 0.1]], like [vocabulary::DEAD_BAND, "friction", "bristle_friction"];
     /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
     /// of Hydraulic Servosystems, 1980).
     asymmetric_gain: AsymmetricGain {
@@ -286,6 +292,11 @@ impl Equations for ClosedLoopActuator {
                     breakaway_error,
                     sliding_speed,
                 },
+            bristle_friction:
+                BristleFriction {
+                    breakaway_error: held_by_bristles,
+                    deflection,
+                },
             reduced_null_gain: null,
             asymmetric_gain: AsymmetricGain { asymmetry },
             valve_lag: ValveLag {
@@ -309,6 +320,15 @@ impl Equations for ClosedLoopActuator {
         let idle = SLOW / (integral + SLOW);
         let held = 1.0 + spring_droop * idle;
         let gain = loop_gain / held;
+        let friction = if held_by_bristles > 0.0 {
+            Some((held_by_bristles, Law::Bristles(deflection)))
+        } else {
+            (breakaway_error > 0.0).then_some((breakaway_error, Law::Sliding(sliding_speed)))
+        };
+        let friction = friction.map(|(held, law)| Rubbing {
+            most: gain * held,
+            law,
+        });
         let form = Loop {
             gain,
             command_lag: lag,
@@ -318,10 +338,7 @@ impl Equations for ClosedLoopActuator {
             spring_droop,
             resonance,
             resonance_damping,
-            rubs: breakaway_error > 0.0,
-        };
-        let rub = |speeds: [f64; 2], share: f64| {
-            rubbing(speeds, share * gain * breakaway_error, sliding_speed) / share
+            friction,
         };
         let fastest = if slowness > 0.0 {
             1.0 / slowness
@@ -331,7 +348,7 @@ impl Equations for ClosedLoopActuator {
         let has_effect =
             dead_band != 0.0 || null.reduction != 0.0 || asymmetry != 0.0 || compression != 0.0;
         let has_effect = has_effect || !inside.valves.is_empty();
-        let is_linear = !has_effect && fastest == f64::INFINITY && !form.rubs;
+        let is_linear = !has_effect && fastest == f64::INFINITY && form.friction.is_none();
         let steps = if is_linear {
             SMOOTH
         } else {
@@ -378,7 +395,7 @@ impl Equations for ClosedLoopActuator {
                     ends: [begin, end],
                     slope: (end - begin) / step.length,
                 };
-                state = step.advance(state, &course, beyond, &rub);
+                state = step.advance(state, &course, beyond);
                 begin = end;
             }
         }
@@ -520,49 +537,69 @@ mod tests {
 
     #[test]
     fn friction_on_the_mass_of_a_motor_is_that_of_its_own_equations() {
-        // L i' = k (r - x) - R i - b v, m v' = b i - F tanh(v / s), by small steps of its own.
+        // L i' = k (r - x) - R i - b v, m v' = b i - F z, with z of the speed or of bristles, by small steps of its own.
         let (mass, resistance, inductance, constant) = (20.0, 1.0, 2e-3, 80.0);
-        let (gain, b, sliding_speed) = (30.0, 2e-4, 2e-3);
+        let (gain, b, sliding_speed, deflection) = (30.0, 2e-4, 2e-3, 1e-4);
         let force = b * gain * constant * constant / resistance;
         let (rate, n, steps) = (200.0, 2000, 400);
         let wave = |t: f64| 4e-3 * (4.0 * t).sin() + 2e-3 * (13.0 * t).sin();
         let command: Vec<f64> = (0..n).map(|k| wave(k as f64 / rate)).collect();
-        let (mut current, mut x, mut v) = (0.0f64, 0.0f64, 0.0f64);
-        let h = 1.0 / rate / f64::from(steps);
-        let mut measured = Vec::new();
-        for k in 0..n {
-            measured.push(x);
-            let next = command[(k + 1).min(n - 1)];
-            for part in 0..steps {
-                let r = command[k] + (next - command[k]) * f64::from(part) / f64::from(steps);
-                let voltage = gain * constant * (r - x);
-                current += h * (voltage - resistance * current - constant * v) / inductance;
-                v += h * (constant * current - force * (v / sliding_speed).tanh()) / mass;
-                x += h * v;
+        let measured = |has_bristles: bool| {
+            let (mut current, mut x, mut v, mut z) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            let h = 1.0 / rate / f64::from(steps);
+            let mut measured = Vec::new();
+            for k in 0..n {
+                measured.push(x);
+                let next = command[(k + 1).min(n - 1)];
+                for part in 0..steps {
+                    let r = command[k] + (next - command[k]) * f64::from(part) / f64::from(steps);
+                    let voltage = gain * constant * (r - x);
+                    current += h * (voltage - resistance * current - constant * v) / inductance;
+                    if has_bristles {
+                        z += h * (v - z * v.abs()) / deflection;
+                    } else {
+                        z = (v / sliding_speed).tanh();
+                    }
+                    v += h * (constant * current - force * z) / mass;
+                    x += h * v;
+                }
             }
-        }
+            measured
+        };
         let resonance = (mass * inductance).sqrt() / constant;
         let nominal = Nominal {
             resonance,
             resonance_damping: 0.5 * resonance * resistance / inductance,
             ..proportional(gain)
         };
-        let off = |breakaway_error: f64| {
-            let effects = Effects {
-                friction: Friction {
-                    breakaway_error,
-                    sliding_speed,
-                },
-                ..Effects::off().unwrap()
-            };
+        let off = |measured: &[f64], effects: Effects| {
             let out = answer(rate, &command, &nominal, &effects);
-            let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
+            let errors = out.iter().zip(measured).map(|(a, b)| (a - b).powi(2));
             let size: f64 = measured.iter().map(|x| x * x).sum();
             (errors.sum::<f64>() / size).sqrt()
         };
-
-        assert!(off(b) < 1e-3, "{}", off(b));
-        assert!(off(0.0) > 0.03, "{}", off(0.0));
+        let none = Effects::off().unwrap();
+        let sliding = Effects {
+            friction: Friction {
+                breakaway_error: b,
+                sliding_speed,
+            },
+            ..none
+        };
+        let bristles = Effects {
+            bristle_friction: BristleFriction {
+                breakaway_error: b,
+                deflection,
+            },
+            ..none
+        };
+        for (own, has_bristles, other) in [(sliding, false, bristles), (bristles, true, sliding)] {
+            let measured = measured(has_bristles);
+            let errors = [own, other, none].map(|effects| off(&measured, effects));
+            assert!(errors[0] < 1e-3, "{errors:?}");
+            assert!(errors[1] > 3.0 * errors[0], "{errors:?}");
+            assert!(errors[2] > 0.03, "{errors:?}");
+        }
     }
 
     #[test]

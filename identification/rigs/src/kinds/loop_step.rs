@@ -14,14 +14,14 @@ pub(super) struct Loop {
     pub(super) spring_droop: f64,
     pub(super) resonance: f64,
     pub(super) resonance_damping: f64,
-    /// Whether there is friction.
-    pub(super) rubs: bool,
+    pub(super) friction: Option<Rubbing>,
 }
 
 /// Lagging command, displacement, flow, integral of the error, velocity and its rate times `P`, flow behind
-/// half of its lag; nothing.
+/// half of its lag; how far the bristles of friction are bent.
 pub(super) type State = [f64; WIDTH];
 const STATES: usize = 7;
+const BENT: usize = STATES;
 /// As processors take numbers.
 pub(super) const WIDTH: usize = 8;
 /// The states, the command, its slope, the flow beyond the linear one, its slope and the speed that friction
@@ -29,9 +29,76 @@ pub(super) const WIDTH: usize = 8;
 const ALL: usize = STATES + 5;
 pub(super) const SLOPE: usize = STATES + 1;
 
+/// How friction builds up.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Law {
+    /// `tanh(v / s)` with s, m/s.
+    Sliding(f64),
+    /// By bristles that bend up to a deflection, m.
+    Bristles(f64),
+}
+
+/// Friction on a speed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rubbing {
+    /// Speed that it takes at most, m/s, where one unit of it takes one.
+    pub(super) most: f64,
+    pub(super) law: Law,
+}
+
+impl Rubbing {
+    /// What it takes of a speed that is `now` and would be `free` after a step of `length` without it, and how far its
+    /// bristles, which were `bent`, are bent then, of 1. `share` is what one unit of it takes.
+    fn taken(&self, speeds: [f64; 2], share: f64, bent: f64, length: f64) -> (f64, f64) {
+        let most = share * self.most;
+        match self.law {
+            Law::Sliding(speed) => (rubbing(speeds, most, speed) / share, 0.0),
+            Law::Bristles(deflection) => {
+                let bent = bending(deflection, speeds, most, bent, length);
+                (-bent * self.most, bent)
+            }
+        }
+    }
+}
+
+/// How far bristles are bent after a step of `length`, implicit: the speed `now` would be `free` without them, and
+/// friction takes `most` of it where they are bent wholly. Over a way of `a` deflections, what they lack decays by
+/// `1 / (1 + a + a^2 / 2)`, which is `exp(-a)` to second order and as still for a long way.
+fn bending(deflection: f64, [now, free]: [f64; 2], most: f64, bent: f64, length: f64) -> f64 {
+    let per_speed = 0.5 * length / deflection;
+    // v + most z(v) = free has one solution, since z grows with v.
+    let (mut low, mut high) = (free - most, free + most);
+    let mut v = free - most * bent;
+    for _ in 0..20 {
+        let way = per_speed * (now + v);
+        let (a, side) = (way.abs(), way.signum());
+        let lacking = 1.0 - bent * side;
+        let decay = 1.0 / (1.0 + a * (1.0 + 0.5 * a));
+        let off = v + most * side * (1.0 - lacking * decay) - free;
+        if off > 0.0 {
+            high = v;
+        } else {
+            low = v;
+        }
+        let slope = lacking * (1.0 + a) * decay * decay * per_speed;
+        let step = off / (1.0 + most * slope);
+        let next = v - step;
+        v = if (low..=high).contains(&next) {
+            next
+        } else {
+            0.5 * (low + high)
+        };
+        if step.abs() <= 1e-6 * most {
+            break;
+        }
+    }
+    // By the balance: where they are stiff, they bend much by little of the speed.
+    ((free - v) / most).clamp(-1.0, 1.0)
+}
+
 /// What friction takes, at `most`, of a speed that is `now` and would be `free` after a step without it: implicit, so
 /// that it sticks with steps of any length. Where the speed turns, friction does inside the step.
-pub(super) fn rubbing([now, free]: [f64; 2], most: f64, sliding_speed: f64) -> f64 {
+fn rubbing([now, free]: [f64; 2], most: f64, sliding_speed: f64) -> f64 {
     if now * (free - most.copysign(now)) < 0.0 {
         let end = free - most * tanh(now / sliding_speed);
         if now * end < 0.0 {
@@ -93,8 +160,8 @@ pub(super) struct Step {
     /// What it sends after the step of a flow beyond the linear one and of what friction takes.
     pub(super) sent_of_beyond: f64,
     pub(super) sent_of_rubbed: f64,
-    /// The state that is the speed on which friction acts, if there is friction.
-    pub(super) rubbed_at: Option<usize>,
+    /// Friction and the state that is the speed on which it acts.
+    pub(super) rubbed: Option<(Rubbing, usize)>,
 }
 
 /// The command over a step.
@@ -124,7 +191,7 @@ impl Loop {
         };
         let has_resonance = self.resonance > 1e-3 * sample;
         // Friction needs a speed to act on.
-        let least = if self.rubs && !has_resonance {
+        let least = if self.friction.is_some() && !has_resonance {
             0.1 * sample
         } else {
             0.0
@@ -209,23 +276,26 @@ impl Loop {
             sent,
             sent_of_beyond: sent_of(beyond),
             sent_of_rubbed: sent_of(friction),
-            rubbed_at: self.rubs.then_some(if has_resonance { 4 } else { 2 }),
+            rubbed: self
+                .friction
+                .map(|own| (own, if has_resonance { 4 } else { 2 })),
         }
     }
 }
 
 impl Step {
-    /// The state after the step. `beyond` is the flow beyond the linear one for what the controller sends; `rub` is
-    /// what friction takes of a speed over a step.
+    /// The state after the step. `beyond` is the flow beyond the linear one for what the controller sends.
     #[inline]
     pub(super) fn advance(
         &self,
         state: State,
         course: &Course,
         beyond: Option<&impl Fn(f64) -> f64>,
-        rub: &impl Fn([f64; 2], f64) -> f64,
     ) -> State {
         let [columns @ .., beyond_column, slope_column, rubbed] = &self.columns;
+        let rub = |own: &Rubbing, at: usize, free: f64| {
+            own.taken([state[at], free], rubbed[at], state[BENT], self.length)
+        };
         let mut after: State = [0.0; WIDTH];
         for (j, column) in columns.iter().enumerate() {
             let value = match j {
@@ -243,17 +313,18 @@ impl Step {
             let [begin, end] = course.ends;
             let now = beyond(sent(&state, begin, course.slope));
             let mut sends = sent(&after, end, course.slope) + now * self.sent_of_beyond;
-            if let Some(at) = self.rubbed_at {
-                let free = after[at] + now * beyond_column[at];
-                sends += self.sent_of_rubbed * rub([state[at], free], rubbed[at]);
+            if let Some((own, at)) = &self.rubbed {
+                let free = after[*at] + now * beyond_column[*at];
+                sends += self.sent_of_rubbed * rub(own, *at, free).0;
             }
             let its_slope = (beyond(sends) - now) / self.length;
             add(&mut after, beyond_column, now);
             add(&mut after, slope_column, its_slope);
         }
-        if let Some(at) = self.rubbed_at {
-            let taken = rub([state[at], after[at]], rubbed[at]);
+        if let Some((own, at)) = &self.rubbed {
+            let (taken, bent) = rub(own, *at, after[*at]);
             add(&mut after, rubbed, taken);
+            after[BENT] = bent;
         }
         after
     }
@@ -281,16 +352,15 @@ mod tests {
             spring_droop: 0.05,
             resonance: 0.004,
             resonance_damping: 0.3,
-            rubs: false,
+            friction: None,
         };
         let (length, share, slope) = (0.01, 0.3, 7.0);
         let state: State = [1.0, -2.0, 0.5, 0.1, 3.0, -1.0, 2.0, 0.0];
         let [middle, end] = [share, 1.0].map(|part| 1.0 + part * length * slope);
-        let none = |_: [f64; 2], _: f64| 0.0;
         let beyond: Option<&fn(f64) -> f64> = None;
         let advance = |state: State, share: f64, ends: [f64; 2]| {
             let step = form.step(share * length, length);
-            step.advance(state, &Course { ends, slope }, beyond, &none)
+            step.advance(state, &Course { ends, slope }, beyond)
         };
         let halfway = advance(state, share, [1.0, middle]);
         let expected = advance(halfway, 1.0 - share, [middle, end]);

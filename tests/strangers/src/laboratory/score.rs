@@ -79,7 +79,7 @@ pub fn worth(truth: &Truth, answer: &Answer) -> Worth {
             || name == "scale" && truth.gives_way && alternatives.contains("spring");
         let is_rail = name == "speed_limit" && truth.is_railed;
         let is_orifice = name == "flow_saturation" && says_orifice(effect, truth.flow_falls);
-        name != "friction"
+        !name.contains("friction")
             && !is_hedged
             && !is_rail
             && !is_orifice
