@@ -443,6 +443,49 @@ mod tests {
         assert!(ask(&server, &get).starts_with("HTTP/1.1 200"));
     }
     #[test]
+    fn the_farewell_waits_for_a_client_that_has_asked_until_it_is_told_of_the_end() {
+        let tap = Arc::new(Tap::new(vec![0], 3));
+        let server = Server::start(&scene(), Arc::clone(&tap), None, 0).unwrap();
+        let rows = format!(
+            "GET /{}/rows?from=0 HTTP/1.1\r\nHost: {}\r\n\r\n",
+            server.token, server.address
+        );
+        let begun = Instant::now();
+        server.farewell();
+        assert!(begun.elapsed() < FAREWELL / 2, "nobody has asked");
+        ask(&server, &rows);
+        std::thread::scope(|scope| {
+            let farewell = scope.spawn(|| server.farewell());
+            std::thread::sleep(Duration::from_millis(100));
+            assert!(!farewell.is_finished());
+            tap.finish("complete");
+            let begun = Instant::now();
+            ask(&server, &rows);
+            farewell.join().unwrap();
+            assert!(begun.elapsed() < FAREWELL / 2);
+        });
+    }
+
+    #[test]
+    fn the_end_is_told_with_the_last_rows_only() {
+        let tap = Arc::new(Tap::new(vec![0], MOST_ROWS + 1));
+        let server = Server::start(&scene(), Arc::clone(&tap), None, 0).unwrap();
+        for n in 0..=MOST_ROWS {
+            tap.push(n as f64, &[0.0]);
+        }
+        tap.finish("complete");
+        assert!(
+            rows(&server.shared, 0).starts_with(r#"{"ended":null,"rows":[[0.0,0.0],[1.0,0.0]"#)
+        );
+        assert!(!server.shared.told.load(Ordering::Relaxed));
+        assert_eq!(
+            rows(&server.shared, MOST_ROWS),
+            r#"{"ended":"complete","rows":[[5000.0,0.0]]}"#
+        );
+        assert!(server.shared.told.load(Ordering::Relaxed));
+    }
+
+    #[test]
     fn parameters_are_changed_at_the_address_of_their_own_only() {
         let gain = Tunable {
             variable: "control.gain".into(),

@@ -478,3 +478,316 @@ fn pages_and_pictures_are_in_the_units_that_were_asked_for() {
         assert!(html(&gallery(), asked).unwrap().contains(tag), "{tag}");
     }
 }
+
+/// Names, places and values of all series, in few digits: what the page's numbers hold.
+fn digest(report: &Report) -> String {
+    let of = |values: &mut dyn Iterator<Item = f64>| {
+        let values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let square = values.iter().map(|value| value * value).sum::<f64>();
+        let root = (square / values.len() as f64).sqrt();
+        let few = |value: f64| number::significant(value, 5);
+        format!("{} to {}, RMS {}", few(least), few(largest), few(root))
+    };
+    let mut text = String::new();
+    for panel in report.sections.iter().flat_map(|section| &section.panels) {
+        let axis = |axis: &Axis| {
+            let kind = if axis.logarithmic { "log " } else { "" };
+            let (label, unit) = (&axis.label, &axis.units.si);
+            format!("{kind}{label} [{unit}] {:?}", axis.limits)
+        };
+        text += &format!(
+            "{}: {} over {}\n",
+            panel.title,
+            axis(&panel.y),
+            axis(&panel.x)
+        );
+        for series in &panel.series {
+            let style = match series.style {
+                Style::Band(_) => "Band".to_string(),
+                ref style => format!("{style:?}"),
+            };
+            text += &format!(
+                "  {} ({style}, {:?}): {} values {} at {}\n",
+                series.name,
+                series.colour,
+                series.values.len(),
+                of(&mut series.values.iter().copied()),
+                of(&mut (0..series.values.len()).map(|n| series.place(n)))
+            );
+        }
+    }
+    text
+}
+
+#[test]
+fn plots_of_a_run_hold_its_histories_spectra_and_energy() {
+    compare("run-plots.txt", &digest(&run_report()));
+}
+
+#[test]
+fn pictures_are_as_before() {
+    for (n, panel) in gallery().sections[0].panels.iter().enumerate() {
+        compare(&format!("gallery-{n}.svg"), &svg(panel, UnitSystem::Si));
+    }
+}
+
+/// A run along two axes, of which the second was to rest and both ended early.
+fn two_axes(at_rest: bool, ended: &str, trip: Option<(f64, String)>) -> Report {
+    let motion = built_in(1, &Options::default()).unwrap();
+    let played = 2000;
+    let (mut displacement, mut velocity, mut acceleration) = followed(&motion);
+    for history in [&mut displacement, &mut velocity, &mut acceleration] {
+        history.truncate(played);
+    }
+    let figures = tracking(&motion, &displacement, &acceleration).unwrap();
+    let across = Motion {
+        name: "rest".into(),
+        notes: vec!["held at zero".into()],
+        ..motion.clone()
+    };
+    let along = |motion, tracking, specimen: bool| Run {
+        system: "biaxial",
+        motion,
+        duration: 10.0,
+        displacement: &displacement,
+        velocity: &velocity,
+        acceleration: &acceleration,
+        identity: vec![identity::entry("System", "biaxial")],
+        commands: vec![("control.valve_command".into(), velocity.clone())],
+        valve_limit: Some(10.0),
+        specimen: specimen.then(|| SpecimenHistory {
+            drift: displacement.clone(),
+            force: acceleration.clone(),
+        }),
+        trip: trip.clone(),
+        changed: Vec::new(),
+        components: vec![Component {
+            name: "table".into(),
+            model: "BiaxialTable.fmu".into(),
+            time: None,
+        }],
+        tracking,
+        ended,
+        settings: vec![("FMI version".into(), "3.0".into())],
+        footer: "Shakebench 0.1.0".into(),
+    };
+    run_along(&[
+        AxisRun {
+            name: "x",
+            run: along(&motion, Some(&figures), true),
+            at_rest: None,
+        },
+        AxisRun {
+            name: "y",
+            run: along(&across, None, false),
+            at_rest: at_rest.then_some([1.25, 3.5]),
+        },
+    ])
+}
+
+#[test]
+fn a_run_along_two_axes_compares_them_and_shows_each() {
+    let trip = Some((3.998, "the table left its reference".to_string()));
+    let report = two_axes(true, "interlock", trip);
+    let page = structure(&html(&report, None).unwrap());
+    compare("two-axes.html", &page);
+    compare("two-axes-plots.txt", &digest(&report));
+}
+
+#[test]
+fn the_summary_of_two_axes_says_how_the_run_ended_and_what_was_measured() {
+    let complete = two_axes(false, "complete", None);
+    assert!(complete.summary.starts_with("Along x the table followed"));
+    assert!(
+        complete
+            .summary
+            .ends_with("Along y there is no tracking error."),
+        "{}",
+        complete.summary
+    );
+    let early = two_axes(true, "the user stopped it", None);
+    assert!(
+        early
+            .summary
+            .starts_with("The run ended early: the user stopped it. Along x"),
+        "{}",
+        early.summary
+    );
+    assert!(
+        early.summary.ends_with(
+            "Axis y was to rest and moved by 1.25 % of the other axis' displacement and 3.50 % of its acceleration \
+             (RMS over peak)."
+        ),
+        "{}",
+        early.summary
+    );
+    // Without an axis at rest its columns are left out.
+    let columns = |report: &Report| report.sections[0].tables[0].columns.len();
+    assert_eq!((columns(&complete), columns(&early)), (7, 9));
+}
+
+#[test]
+fn the_summary_of_a_run_says_how_it_ended() {
+    let motion = built_in(1, &Options::default()).unwrap();
+    let (displacement, velocity, acceleration) = followed(&motion);
+    let said = |ended, trip: Option<(f64, String)>| {
+        let report = run(&Run {
+            system: "bare",
+            motion: &motion,
+            duration: motion.duration(),
+            displacement: &displacement[..500],
+            velocity: &velocity[..500],
+            acceleration: &acceleration[..500],
+            identity: Vec::new(),
+            commands: Vec::new(),
+            valve_limit: None,
+            specimen: None,
+            trip,
+            changed: Vec::new(),
+            components: Vec::new(),
+            tracking: None,
+            ended,
+            settings: Vec::new(),
+            footer: String::new(),
+        });
+        assert_eq!(report.facts.len(), 2, "no figures of tracking");
+        let headings: Vec<&str> = report.sections.iter().map(|own| &*own.heading).collect();
+        assert_eq!(
+            headings,
+            ["Time histories", "In frequency", "The motion", "The run"]
+        );
+        // What was not played is drawn, unless a shorter run was asked for.
+        let reference = &report.sections[0].panels[0].series[0];
+        let drawn = if ended == "complete" {
+            500
+        } else {
+            motion.len()
+        };
+        assert_eq!(reference.values.len(), drawn);
+        report.summary
+    };
+    assert_eq!(said("complete", None), "Tracking could not be measured.");
+    let stopped = (0.998, "the valve saturated".to_string());
+    assert_eq!(
+        said("interlock", Some(stopped)),
+        "The run was stopped at 0.998 s: the valve saturated. It has no tracking error."
+    );
+    assert_eq!(
+        said("the client left", None),
+        "The run ended early: the client left. It has no tracking error."
+    );
+}
+
+#[test]
+fn bars_are_boxes_with_marks_intervals_and_a_legend() {
+    let bar = |name: &str, value, interval, colour| Bar {
+        name: name.into(),
+        value,
+        interval,
+        colour,
+    };
+    let report = Report {
+        sections: vec![Section {
+            bars: vec![Bars {
+                title: "Errors".into(),
+                groups: vec![
+                    BarGroup {
+                        label: "one & two".into(),
+                        bars: vec![
+                            bar("before", 8.0, None, 1),
+                            bar("after", 2.0, Some([1.0, 3.0]), 2),
+                        ],
+                    },
+                    BarGroup {
+                        label: "three".into(),
+                        bars: vec![bar("before", 4.0, None, 1)],
+                    },
+                ],
+                mark: Some((6.0, "limit <6>".into())),
+            }],
+            ..Section::default()
+        }],
+        ..Report::default()
+    };
+    let page = html(&report, Some(UnitSystem::Si)).unwrap();
+    let drawn = between(
+        &page,
+        "<div class=\"bars\">\n",
+        "</div></div>\n<div class=\"legend\">",
+    );
+    let group = |label: &str| format!("<div class=\"group\"><span>{label}</span><div>");
+    let track = |name: &str, width: &str, colour: usize| {
+        format!(
+            "<div class=\"track\" title=\"{name}\"><i style=\"width:{width}%;background:var(--series-{colour})\"></i>\
+             <s style=\"left:75.00%\"></s>"
+        )
+    };
+    let expected = [
+        group("one &amp; two"),
+        track("before", "100.00", 1),
+        "<b style=\"left:100.00%\">8.00</b></div>".into(),
+        track("after", "25.00", 2),
+        "<u style=\"left:12.50%;width:25.00%\"></u><b style=\"left:37.50%\">2.00</b></div>".into(),
+        "</div></div>\n".into(),
+        group("three"),
+        track("before", "50.00", 1),
+        "<b style=\"left:50.00%\">4.00</b></div>".into(),
+    ];
+    assert_eq!(drawn, expected.concat());
+    let legend = between(&page, "<div class=\"legend\">", "</div>");
+    assert_eq!(
+        legend,
+        "<span><i style=\"background:var(--series-1)\"></i>before</span>\
+         <span><i style=\"background:var(--series-2)\"></i>after</span>\
+         <span><s></s>limit &lt;6&gt;</span>"
+    );
+}
+
+#[test]
+fn the_first_rows_of_a_table_are_its_headings_and_their_units() {
+    let rows = |text: &str| -> Vec<Vec<String>> {
+        let rows = text.lines();
+        rows.map(|row| row.split('|').map(str::to_string).collect())
+            .collect()
+    };
+    let table = Table::headed("errors", rows("axis|error\nx|1\ny|2"));
+    assert_eq!(
+        (&*table.caption, table.columns),
+        ("errors", vec!["axis".into(), "error".into()])
+    );
+    let cells = |row: &[&str]| -> Vec<Cell> { row.iter().map(|cell| Cell::from(*cell)).collect() };
+    assert_eq!(table.rows, [cells(&["x", "1"]), cells(&["y", "2"])]);
+    let table = Table::headed_with_units("", rows("axis|error\n|mm\nx|1"));
+    assert_eq!(table.columns, ["axis", "error (mm)"]);
+    assert_eq!(table.rows, [cells(&["x", "1"])]);
+    let lone = Table::headed_with_units("", rows("axis|error"));
+    assert_eq!((lone.columns.len(), lone.rows.len()), (2, 0));
+    assert_eq!(
+        Cell::Quantity(0.0254, Units::DISPLACEMENT, 3).text(UnitSystem::Us),
+        "1.00 in"
+    );
+    assert_eq!(
+        Cell::Quantity(0.0254, Units::DISPLACEMENT, 3).text(UnitSystem::Si),
+        "25.4 mm"
+    );
+    assert_eq!(
+        Cell::Quantity(2.0, Units::NONE, 2).text(UnitSystem::Si),
+        "2.0"
+    );
+}
+
+#[test]
+fn a_thinned_series_keeps_its_extremes_and_a_short_one_everything() {
+    let values: Vec<f64> = (0..100).map(f64::from).collect();
+    let series = Series::history("a", 0.5, &values);
+    assert_eq!(series.clone().thinned(100).values, values);
+    let thin = series.thinned(10);
+    assert_eq!(
+        thin.values,
+        [0.0, 19.0, 20.0, 39.0, 40.0, 59.0, 60.0, 79.0, 80.0, 99.0]
+    );
+    assert_eq!((thin.place(1), thin.place(9)), (9.5, 49.5));
+    assert!(thin.place(10).is_nan());
+}
