@@ -266,3 +266,110 @@ fn write_to<W: Write + Seek>(
     }
     Ok(archive.finish()?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contents() -> Contents<'static> {
+        let text = |name: &str| {
+            format!("<fmiModelDescription>\n  <ModelVariables/>{name}\n</fmiModelDescription>")
+        };
+        Contents {
+            descriptions: Descriptions {
+                name: "One".into(),
+                fmi2: text("two"),
+                fmi3: text("three"),
+                documentation: "<html/>".into(),
+                terminals: "<terminals/>".into(),
+            },
+            libraries: vec![("x86_64-linux".parse().unwrap(), b"library".to_vec())],
+            licences: vec![("LICENSE-MIT.txt".into(), b"MIT".to_vec())],
+            notices: "notices".into(),
+            revision: Some("1a2b"),
+        }
+    }
+
+    #[test]
+    fn an_fmu_holds_the_files_of_its_version() {
+        let all = |version| contents().entries(version);
+        let (two, three) = (all(FmiVersion::V2), all(FmiVersion::V3));
+        let names = |entries: &Entries| entries.keys().cloned().collect::<Vec<_>>();
+        let licences = [
+            "documentation/licenses/LICENSE-MIT.txt",
+            "documentation/licenses/license.txt",
+            "documentation/licenses/third-party.txt",
+        ];
+        let mut expected = vec!["binaries/linux64/One.so", "documentation/index.html"];
+        expected.extend(licences);
+        expected.extend(["model.png", "modelDescription.xml", "resources/"]);
+        assert_eq!(names(&two), expected);
+        let mut expected = vec!["binaries/x86_64-linux/One.so", "documentation/index.html"];
+        expected.extend(licences);
+        expected.extend([
+            "modelDescription.xml",
+            "resources/",
+            "terminalsAndIcons/icon.png",
+            "terminalsAndIcons/terminalsAndIcons.xml",
+        ]);
+        assert_eq!(names(&three), expected);
+        let text = |entries: &Entries| {
+            String::from_utf8_lossy(&entries["modelDescription.xml"]).into_owned()
+        };
+        assert!(text(&two).contains("two") && text(&two).contains("build=\"1a2b\""));
+        assert!(text(&three).contains("three") && text(&three).contains("build=\"1a2b\""));
+        assert_eq!(two["binaries/linux64/One.so"], b"library");
+        assert_eq!(two["model.png"], ICON);
+        assert!(two["resources/"].is_empty());
+    }
+
+    #[test]
+    fn the_same_contents_are_not_written_again_and_give_the_same_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, other] = ["One.fmu", "Other.fmu"].map(|name| folder.path().join(name));
+        let entries = contents().entries(FmiVersion::V3);
+        write_archive(&one, &entries, None).unwrap();
+        write_archive(&other, &entries, None).unwrap();
+        let bytes = fs::read(&one).unwrap();
+        assert_eq!(bytes, fs::read(&other).unwrap());
+        assert_eq!(read_archive(&one).unwrap(), entries);
+        assert_eq!(
+            fs::read_dir(folder.path()).unwrap().count(),
+            2,
+            "no draft is left"
+        );
+        // Its time stays.
+        let old = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000_000);
+        File::options()
+            .write(true)
+            .open(&one)
+            .unwrap()
+            .set_modified(old)
+            .unwrap();
+        write_archive(&one, &entries, None).unwrap();
+        assert_eq!(fs::metadata(&one).unwrap().modified().unwrap(), old);
+        let mut changed = entries.clone();
+        changed.insert("resources/more".into(), b"1".to_vec());
+        write_archive(&one, &changed, None).unwrap();
+        assert_eq!(read_archive(&one).unwrap(), changed);
+        let told = write_archive(&folder.path().join("none/One.fmu"), &entries, None).unwrap_err();
+        assert!(told.to_string().contains("One.fmu"), "{told}");
+    }
+
+    #[test]
+    fn libraries_are_programs_and_smallest_where_they_were_compressed_before() {
+        let own = contents();
+        let entries = own.entries(FmiVersion::V2);
+        let mut smallest = Smallest::of(&own.libraries).unwrap();
+        assert_eq!(smallest.place(b"library"), Some(0));
+        assert_eq!(smallest.place(b"another"), None);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("One.fmu");
+        write_archive(&path, &entries, Some(&mut smallest)).unwrap();
+        assert_eq!(read_archive(&path).unwrap(), entries);
+        let mut archive = ZipArchive::new(File::open(&path).unwrap()).unwrap();
+        let mut mode = |name: &str| archive.by_name(name).unwrap().unix_mode().unwrap() & 0o777;
+        assert_eq!(mode("binaries/linux64/One.so"), 0o755);
+        assert_eq!(mode("modelDescription.xml"), 0o644);
+    }
+}

@@ -293,3 +293,96 @@ fn first_line(command: &mut Command) -> Option<String> {
     let line = text.lines().next().map(str::to_string);
     line.filter(|_| output.status.success())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn installation(files: &[&str]) -> (tempfile::TempDir, Installation) {
+        let folder = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = folder.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        let own = Installation::new(Some(folder.path().into()), None);
+        (folder, own)
+    }
+
+    #[test]
+    fn components_are_counted_by_version_and_damaged_ones_are_named() {
+        let (_one, own) = installation(&["fmi2/A.fmu", "fmi2/B.fmu", "fmi3/A.fmu"]);
+        let found = components(&own);
+        assert_eq!(found.len(), 4);
+        assert_eq!(
+            (found[0].state, &*found[0].found, &found[0].cure),
+            (State::Good, "2 for FMI 2.0, 1 for FMI 3.0", &None)
+        );
+        for fault in &found[1..] {
+            assert_eq!((fault.part, fault.state), ("component", State::Bad));
+            assert!(
+                fault.found.contains(".fmu") && fault.cure.is_some(),
+                "{fault:?}"
+            );
+        }
+        let (_two, own) = installation(&["fmi3/A.fmu"]);
+        let found = components(&own);
+        assert_eq!(
+            (found[0].state, &*found[0].found),
+            (State::Absent, "0 for FMI 2.0, 1 for FMI 3.0")
+        );
+        assert!(
+            found[0]
+                .cure
+                .as_ref()
+                .unwrap()
+                .contains("one FMI version is missing")
+        );
+        let (_none, own) = installation(&[]);
+        let found = components(&own);
+        assert_eq!((found.len(), found[0].state), (1, State::Bad));
+        assert!(
+            found[0].found.contains("no FMUs in this folder"),
+            "{found:?}"
+        );
+        let process = own_process(&own);
+        assert_eq!(
+            (process.state, process.cure.as_deref()),
+            (State::Absent, Some("run with --isolate none"))
+        );
+    }
+
+    #[test]
+    fn folders_are_tried_by_making_a_file() {
+        assert!(writable(&std::env::temp_dir()).is_ok());
+        assert!(writable(Path::new("/no/such/folder")).is_err());
+        let own = temporary_folder();
+        assert_eq!((own.state, own.cure), (State::Good, None));
+        assert!(own.found.ends_with(" can be written"), "{}", own.found);
+        let own = folder_for_results();
+        assert_eq!(
+            (own.state, &*own.found, own.cure),
+            (State::Good, "can be written", None)
+        );
+    }
+
+    #[test]
+    fn a_program_says_its_version_in_its_first_line() {
+        let line = |script: &str| first_line(Command::new("sh").args(["-c", script]));
+        assert_eq!(line("echo one; echo two").as_deref(), Some("one"));
+        assert_eq!(line("echo one; exit 1"), None);
+        assert_eq!(line("true"), None);
+        assert_eq!(first_line(&mut Command::new("/no/such/program")), None);
+        assert_eq!(
+            (found_or_absent(true), found_or_absent(false)),
+            (State::Good, State::Absent)
+        );
+        let own = cargo();
+        assert_eq!(own.state == State::Good, own.cure.is_none());
+        assert!(
+            own.found.starts_with("cargo ") || own.found == "not found",
+            "{}",
+            own.found
+        );
+    }
+}

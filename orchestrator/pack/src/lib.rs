@@ -158,3 +158,34 @@ pub fn model_descriptions() -> Result<Vec<(PathBuf, String)>, PackError> {
 pub fn workspace_root() -> Result<PathBuf, PackError> {
     Ok(Workspace::find()?.root)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_beside_this_one_is_found_by_its_name() {
+        let own = program::file().unwrap();
+        let name = own.file_stem().unwrap().to_string_lossy();
+        assert_eq!(beside(&name), Some(own.clone()));
+        assert_eq!(beside("no-such-program"), None);
+    }
+
+    #[test]
+    fn packed_fmus_are_below_the_workspace() {
+        let root = workspace_root().unwrap();
+        assert!(root.join("fmus/kit/Cargo.toml").is_file());
+        assert_eq!(default_folder().unwrap(), root.join("target/fmus"));
+    }
+
+    #[test]
+    fn fmus_are_not_packed_into_a_file() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let told = build_fmus(file.path(), &FmiVersion::ALL).unwrap_err();
+        assert!(matches!(told, PackError::File { .. }), "{told}");
+        let told = build_component("fmus/shake_table", file.path(), &FmiVersion::ALL).unwrap_err();
+        assert!(matches!(told, PackError::File { .. }), "{told}");
+        let told = pack_libraries(&[], file.path(), &FmiVersion::ALL, None, false).unwrap_err();
+        assert!(matches!(told, PackError::File { .. }), "{told}");
+    }
+}

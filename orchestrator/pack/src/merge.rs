@@ -126,4 +126,57 @@ mod tests {
             assert!(problem.to_string().contains(word), "{problem}");
         }
     }
+
+    #[test]
+    fn folders_of_two_platforms_become_one_with_all_libraries() {
+        let folders = [(); 3].map(|()| tempfile::tempdir().unwrap());
+        let [linux, mac, out] = folders.each_ref().map(|own| own.path().to_path_buf());
+        let put = |folder: &Path, version: FmiVersion, name: &str, files: &[(&str, &str)]| {
+            let below = folder.join(version.folder());
+            fs::create_dir_all(&below).unwrap();
+            write_archive(&below.join(name), &archive(files), None).unwrap();
+        };
+        let own = ("modelDescription.xml", "a");
+        put(
+            &linux,
+            FmiVersion::V3,
+            "One.fmu",
+            &[own, ("binaries/x86_64-linux/One.so", "l")],
+        );
+        put(&linux, FmiVersion::V2, "One.fmu", &[own]);
+        put(
+            &mac,
+            FmiVersion::V3,
+            "One.fmu",
+            &[own, ("binaries/x86_64-darwin/One.dylib", "m")],
+        );
+        let written = merge(&[linux.clone(), mac.clone()], &out).unwrap();
+        let names: Vec<_> = written
+            .iter()
+            .map(|fmu| (&*fmu.name, fmu.version))
+            .collect();
+        assert_eq!(names, [("One", FmiVersion::V2), ("One", FmiVersion::V3)]);
+        assert_eq!(written[1].path, out.join("fmi3/One.fmu"));
+        assert_eq!(read_archive(&written[1].path).unwrap().len(), 3);
+        put(
+            &mac,
+            FmiVersion::V2,
+            "One.fmu",
+            &[("modelDescription.xml", "b")],
+        );
+        let told = merge(&[linux.clone(), mac.clone()], &out)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.contains("cannot be merged: `modelDescription.xml` differs"),
+            "{told}"
+        );
+        let told = merge(&[linux, out.join("none")], &out)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.contains("no FMUs in this folder, to be merged"),
+            "{told}"
+        );
+    }
 }

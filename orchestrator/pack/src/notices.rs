@@ -309,4 +309,89 @@ mod tests {
         }
         assert!(notices.of(folder.path()).is_err());
     }
+
+    fn package(folder: &Path, licence: Option<&str>) -> Package {
+        Package {
+            id: "one".into(),
+            targets: Vec::new(),
+            dependencies: Vec::new(),
+            features: HashMap::new(),
+            name: "one".into(),
+            version: "1.2.3".into(),
+            license: licence.map(str::to_string),
+            repository: Some("https://example.org/one".into()),
+            source: Some("registry".into()),
+            manifest_path: folder.join("Cargo.toml"),
+        }
+    }
+
+    #[test]
+    fn a_crate_offers_the_mit_licence_only_by_a_plain_choice() {
+        let offers = |licence| offers_mit(&package(Path::new(""), licence));
+        for licence in [
+            "MIT",
+            "Apache-2.0 OR MIT",
+            "MIT/Apache-2.0",
+            "Zlib OR MIT OR BSL-1.0",
+        ] {
+            assert!(offers(Some(licence)), "{licence}");
+        }
+        for licence in [
+            "MIT AND Zlib",
+            "(MIT OR Zlib) AND Unicode-3.0",
+            "MIT-0",
+            "Apache-2.0",
+        ] {
+            assert!(!offers(Some(licence)), "{licence}");
+        }
+        assert!(!offers(None));
+    }
+
+    #[test]
+    fn of_several_licences_to_choose_from_the_notice_of_mit_is_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, content) in [
+            ("LICENSE-MIT", "\n\nthe MIT text  \r\nwith its lines\n\n"),
+            ("LICENSE-APACHE", "the Apache text"),
+            ("COPYRIGHT", "who made it"),
+            ("README.md", "no notice"),
+        ] {
+            fs::write(folder.path().join(name), content).unwrap();
+        }
+        let files = |licence| licence_files(&package(folder.path(), Some(licence)));
+        let (whose, mit) = ("who made it\n", "the MIT text\nwith its lines\n");
+        assert_eq!(files("MIT OR Apache-2.0"), [whose, mit]);
+        assert_eq!(
+            files("MIT AND Apache-2.0"),
+            [whose, "the Apache text\n", mit]
+        );
+        let told = text(&[&package(folder.path(), Some("MIT OR Apache-2.0"))]);
+        let line = "=".repeat(78);
+        let expected = format!(
+            "\none 1.2.3\n    licence: MIT OR Apache-2.0; https://example.org/one\n    notices: [1] [2]\n\
+             \n{line}\n[1]\n\n{whose}\n{line}\n[2]\n\n{mit}"
+        );
+        assert!(told.ends_with(&expected), "{told}");
+        let none = Package {
+            repository: None,
+            ..package(Path::new("/no/such/folder"), None)
+        };
+        let told = text(&[&none]);
+        assert!(
+            told.ends_with("\none 1.2.3\n    licence: see its files; crates.io\n    no file of its own with a notice\n"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn what_is_built_for_the_web_or_to_build_is_not_linked() {
+        let kind = |kind: Option<&str>, target: Option<&str>| Kind {
+            kind: kind.map(str::to_string),
+            target: target.map(str::to_string),
+        };
+        assert!(kind(None, None).is_linked());
+        assert!(kind(None, Some("cfg(windows)")).is_linked());
+        assert!(!kind(None, Some("cfg(target_arch = \"wasm32\")")).is_linked());
+        assert!(!kind(Some("build"), None).is_linked());
+    }
 }

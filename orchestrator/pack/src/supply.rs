@@ -304,4 +304,73 @@ mod tests {
         assert_eq!(own, own.clone());
         assert_ne!(own, Installation::default());
     }
+
+    #[test]
+    fn an_fmu_of_another_program_version_or_tool_is_unfit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("One.fmu");
+        let told = |text: &str| {
+            let entries = [("modelDescription.xml".to_string(), text.as_bytes().to_vec())];
+            crate::write_archive(&path, &entries.into(), None).unwrap();
+            let fmu = PackedFmu {
+                name: "One".into(),
+                version: FmiVersion::V3,
+                path: path.clone(),
+            };
+            check(&fmu).map_err(|error| error.to_string())
+        };
+        let good =
+            format!(r#"<a generationTool="fmu-kit 1" version="{VERSION}" fmiVersion="3.0"/>"#);
+        assert_eq!(told(&good), Ok(()));
+        for (text, expected) in [
+            (good.replace("fmu-kit", "Other"), "made by `Other 1`"),
+            (
+                good.replace(VERSION, "0.0.0"),
+                "is of version 0.0.0, this program of ",
+            ),
+            (good.replace("\"3.0\"", "\"2.0\""), "is for FMI 2.0"),
+            ("no XML".to_string(), "has a damaged modelDescription.xml"),
+        ] {
+            let told = told(&text).unwrap_err();
+            assert!(
+                told.contains(expected) && told.contains("One.fmu"),
+                "{told}"
+            );
+        }
+    }
+
+    #[test]
+    fn messages_name_who_chose_a_folder_and_where_else_was_looked() {
+        let words = [
+            Origin::Option,
+            Origin::Environment,
+            Origin::BesideProgram,
+            Origin::Workspace,
+        ]
+        .map(Origin::words);
+        assert_eq!(
+            words,
+            [
+                "named by --fmus",
+                "named by SHAKEBENCH_FMUS",
+                "beside the program",
+                "of the workspace"
+            ]
+        );
+        let none = |beside: Vec<PathBuf>| PackError::NoFmus { beside }.to_string();
+        assert!(
+            none(Vec::new())
+                .starts_with("no FMUs of the components: none next to the program, none in --fmus")
+        );
+        let told = none(vec!["/a".into(), "/b/c".into()]);
+        assert!(
+            told.contains("none next to the program (/a, /b/c), none in"),
+            "{told}"
+        );
+        let places = beside_program();
+        assert!(
+            places[0].ends_with("fmus") && places[1].ends_with("share/shakebench/fmus"),
+            "{places:?}"
+        );
+    }
 }

@@ -240,4 +240,63 @@ mod tests {
         fs::remove_file(root.join("fmus/a/src/new.rs")).unwrap();
         assert_ne!(stamp(), before);
     }
+
+    #[test]
+    fn fmus_are_up_to_date_until_a_source_or_one_of_them_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        for name in ["Cargo.toml", "Cargo.lock", "LICENSE-APACHE", "LICENSE-MIT"] {
+            fs::write(root.join(name), "").unwrap();
+        }
+        let package = root.join("fmus/one");
+        fs::create_dir_all(&package).unwrap();
+        fs::write(package.join("lib.rs"), "1").unwrap();
+        let out = root.join("target/fmus");
+        fs::create_dir_all(out.join("fmi3")).unwrap();
+        let path = out.join("fmi3/One.fmu");
+        fs::write(&path, "an FMU").unwrap();
+        let workspace = Workspace { root: root.into() };
+        let fmus = fmus_in(&out).unwrap();
+        assert_eq!(fmus.len(), 1);
+        assert!(packed(&workspace, &out).is_none(), "nothing is noted");
+        let note = || {
+            let packages = BTreeSet::from([package.clone()]);
+            let stamp = stamp(root, &packages).unwrap();
+            Sources { packages, stamp }.note(&out, &fmus);
+        };
+        note();
+        let noted = fs::read_to_string(file(&out).unwrap()).unwrap();
+        let begin = format!("package {}\nfmu {}\n", package.display(), path.display());
+        assert!(noted.starts_with(&begin), "{noted}");
+        assert_eq!(fs::read_dir(&out).unwrap().count(), 2, "no draft is left");
+        assert_eq!(packed(&workspace, &out).as_deref(), Some(&fmus[..]));
+        // Another FMU in the folder is that of a component that is no more.
+        fs::write(out.join("fmi3/Old.fmu"), "").unwrap();
+        assert_eq!(packed(&workspace, &out).as_deref(), Some(&fmus[..]));
+        fs::write(package.join("lib.rs"), "22").unwrap();
+        assert!(packed(&workspace, &out).is_none());
+        note();
+        assert!(packed(&workspace, &out).is_some());
+        fs::write(&path, "another FMU").unwrap();
+        assert!(packed(&workspace, &out).is_none());
+        fs::remove_file(&path).unwrap();
+        assert!(packed(&workspace, &out).is_none());
+    }
+
+    #[test]
+    fn settings_of_the_compiler_change_the_build() {
+        let changes = |name: &str| changes_the_build(OsStr::new(name));
+        for name in [
+            "RUSTFLAGS",
+            "RUSTC",
+            "RUSTC_WRAPPER",
+            "CARGO_PROFILE_RELEASE_LTO",
+            "CARGO_BUILD_JOBS",
+        ] {
+            assert!(changes(name), "{name}");
+        }
+        for name in ["CARGO", "CARGO_PKG_NAME", "HOME", "MY_RUSTFLAGS"] {
+            assert!(!changes(name), "{name}");
+        }
+    }
 }

@@ -169,4 +169,113 @@ mod tests {
         let gone = with_resource(&folder.path().join("Gone.fmu"), "a", Vec::new()).unwrap_err();
         assert!(gone.to_string().contains("Gone.fmu"), "{gone}");
     }
+
+    /// One description in both versions of FMI, with a Real, an enumeration and a Boolean.
+    const DESCRIPTIONS: [&str; 2] = [
+        r#"<fmiModelDescription fmiVersion="2.0" modelName="One" guid="{1}"><ModelVariables>
+<ScalarVariable name="mass" causality="parameter" description="moving mass"><Real start="2" unit="kg"/></ScalarVariable>
+<ScalarVariable name="law" causality="parameter"><Enumeration start="1"/></ScalarVariable>
+<ScalarVariable name="on" causality="parameter"><Boolean start="true"/></ScalarVariable>
+<ScalarVariable name="x" causality="output"><Real start="7"/></ScalarVariable>
+</ModelVariables></fmiModelDescription>"#,
+        r#"<fmiModelDescription fmiVersion="3.0" modelName="One" instantiationToken="{1}"><ModelVariables>
+<Float64 name="mass" causality="parameter" description="moving mass" start="2" unit="kg"/>
+<Enumeration name="law" causality="parameter" start="1"/>
+<Boolean name="on" causality="parameter" start="true"/>
+<Float64 name="x" causality="output" start="7"/>
+</ModelVariables></fmiModelDescription>"#,
+    ];
+
+    fn start(name: &str, value: f64, note: &str) -> StartValue {
+        StartValue {
+            name: name.into(),
+            value,
+            note: note.into(),
+        }
+    }
+
+    fn original(folder: &Path, description: &str) -> std::path::PathBuf {
+        let path = folder.join("One.fmu");
+        let entries: Entries = [("modelDescription.xml".to_string(), description.into())].into();
+        crate::write_archive(&path, &entries, None).unwrap();
+        path
+    }
+
+    #[test]
+    fn a_variant_has_its_own_name_token_values_and_notes() {
+        for description in DESCRIPTIONS {
+            let folder = tempfile::tempdir().unwrap();
+            let path = original(folder.path(), description);
+            let out = folder.path().join("Two.fmu");
+            let values = [
+                start("mass", 2.5, "estimated <here>"),
+                start("law", 3.0, ""),
+            ];
+            write_variant(&path, &out, "Two & more", &values).unwrap();
+            let entries = read_archive(&out).unwrap();
+            let table = "mass,2.5\nlaw,3\n";
+            assert_eq!(entries["resources/start_values.csv"], table.as_bytes());
+            let token = variant_token("{1}", table);
+            assert_ne!(token, "{1}");
+            let expected = description
+                .replace("modelName=\"One\"", "modelName=\"Two &amp; more\"")
+                .replace("{1}", &token)
+                .replace("start=\"2\"", "start=\"2.5\"")
+                .replace("start=\"1\"", "start=\"3\"")
+                .replace("moving mass", "moving mass (estimated &lt;here&gt;)");
+            assert_eq!(
+                String::from_utf8_lossy(&entries["modelDescription.xml"]),
+                expected
+            );
+            // In memory the name stays.
+            let bytes = variant_bytes(&path, &values).unwrap();
+            std::fs::write(&out, bytes).unwrap();
+            let entries = read_archive(&out).unwrap();
+            let expected = expected.replace("Two &amp; more", "One");
+            assert_eq!(
+                String::from_utf8_lossy(&entries["modelDescription.xml"]),
+                expected
+            );
+            let again = variant_bytes(&out, &[]).unwrap_err().to_string();
+            assert!(again.contains("is a variant itself"), "{again}");
+        }
+    }
+
+    #[test]
+    fn values_that_a_variable_cannot_start_with_are_refused() {
+        for description in DESCRIPTIONS {
+            let folder = tempfile::tempdir().unwrap();
+            let path = original(folder.path(), description);
+            for (own, expected) in [
+                (start("x", 1.0, ""), "`x` is not a parameter of it"),
+                (start("other", 1.0, ""), "`other` is not a parameter of it"),
+                (
+                    start("on", 1.0, ""),
+                    "`on` = 1 is neither Float64 nor an enumeration",
+                ),
+                (start("law", 1.5, ""), "`law` = 1.5 is neither"),
+                (start("mass", f64::NAN, ""), "`mass` = NaN is neither"),
+                (
+                    start("law", 1.0, "why"),
+                    "an attribute `description` is missing",
+                ),
+            ] {
+                let told = variant_bytes(&path, &[own]).unwrap_err().to_string();
+                assert!(
+                    told.contains("One.fmu") && told.contains(expected),
+                    "{told}"
+                );
+            }
+            let without = description
+                .replace("guid=", "other=")
+                .replace("instantiationToken=", "other=");
+            let told = variant_bytes(&original(folder.path(), &without), &[]).unwrap_err();
+            assert!(told.to_string().contains("the token is missing"), "{told}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("None.fmu");
+        crate::write_archive(&path, &Entries::new(), None).unwrap();
+        let told = variant_bytes(&path, &[]).unwrap_err().to_string();
+        assert!(told.contains("no readable modelDescription.xml"), "{told}");
+    }
 }

@@ -273,4 +273,75 @@ mod tests {
         assert_eq!(mit.0, "LICENSE-MIT.txt");
         assert!(holds(&mit.1, "WITHOUT WARRANTY OF ANY KIND"));
     }
+
+    #[test]
+    fn cargo_answers_or_its_command_is_named() {
+        let workspace = Workspace::find().unwrap();
+        let answer = workspace.cargo(&["--version"]).unwrap();
+        assert!(answer.starts_with("cargo "), "{answer}");
+        let told = workspace
+            .cargo(&["no-such-command", "--quiet"])
+            .unwrap_err();
+        let told = told.to_string();
+        assert!(
+            told.starts_with("`cargo no-such-command --quiet` failed:"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn components_are_the_crates_in_a_folder_of_fmus() {
+        let workspace = Workspace {
+            root: "/project".into(),
+        };
+        let publishes = |folder: &str| workspace.publishes(Path::new(folder));
+        assert!(publishes("/project/fmus/table") && publishes("/project/hybrid/fmus/ring"));
+        for other in [
+            "/project/fmus",
+            "/project/plant",
+            "/other/fmus/table",
+            "/project/fmus/table/more",
+        ] {
+            assert!(!publishes(other), "{other}");
+        }
+        assert_eq!(workspace.fmus(), Path::new("/project/target/fmus"));
+        let target = serde_json::json!({"kind": ["rlib", "cdylib"]});
+        assert!(kinds(&target, "cdylib") && !kinds(&target, "bin"));
+        assert!(!kinds(&serde_json::json!({}), "cdylib"));
+    }
+
+    #[test]
+    fn compiled_libraries_are_looked_for_by_platform() {
+        let workspace = Workspace::find().unwrap();
+        let here = Platform::here().unwrap();
+        let windows: Platform = "x86_64-windows".parse().unwrap();
+        let folders = [
+            (windows.clone(), PathBuf::from("/win")),
+            (here.clone(), PathBuf::from("/here")),
+        ];
+        let components = workspace.published_from(&folders).unwrap();
+        let folder = workspace.root.join("fmus/shake_table");
+        let table = components.iter().find(|own| own.folder == folder).unwrap();
+        assert_eq!(
+            table.library,
+            Path::new("/here").join(here.library_file("ShakeTable"))
+        );
+        assert_eq!(
+            table.libraries,
+            [
+                (windows.clone(), PathBuf::from("/win/ShakeTable.dll")),
+                (here, table.library.clone()),
+            ]
+        );
+        assert!(
+            components
+                .iter()
+                .all(|own| workspace.publishes(&own.folder))
+        );
+        let told = workspace
+            .published_from(&[(windows, "/win".into())])
+            .err()
+            .unwrap();
+        assert!(matches!(told, PackError::NoOwnLibraries(_)), "{told}");
+    }
 }
