@@ -311,3 +311,157 @@ fn free_bytes(place: &Path) -> Option<u64> {
 fn free_bytes(_place: &Path) -> Option<u64> {
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::{Column, Kind, Role, Row};
+    use super::*;
+
+    /// Runs whose third is stopped, and of which the last two are the same.
+    struct Few;
+
+    impl Runs for Few {
+        fn check(&self) -> Result<(), Error> {
+            Ok(())
+        }
+
+        fn head(&self) -> Result<Head, Error> {
+            let column = |name: &str, role, kind| Column {
+                name: name.to_string(),
+                unit: None,
+                role,
+                kind,
+            };
+            let columns = vec![
+                column("number", Role::Run, Kind::Number),
+                column("run", Role::Run, Kind::Text),
+                column("x", Role::Result, Kind::Number),
+                column("ended", Role::Ending, Kind::Text),
+            ];
+            Ok(Head::of(Default::default(), columns))
+        }
+
+        fn count(&self) -> u64 {
+            7
+        }
+
+        fn name(&self, number: u64) -> String {
+            format!("run-{}", number.min(5))
+        }
+
+        fn run(&self, number: u64) -> Row {
+            let words = ["complete", "terminated", "interlock", "failed", INVALID];
+            let word = words.get(number as usize).unwrap_or(&"complete");
+            Row {
+                run: self.name(number),
+                cells: vec![Cell::Number(10.0 * number as f64), (*word).into()],
+            }
+        }
+    }
+
+    fn plan(folder: &Path, shard: Option<&str>, replaces: bool) -> Plan {
+        Plan {
+            folder: Out::new(folder).replacing(replaces),
+            shard: shard.map(|text| text.parse().unwrap()),
+            jobs: Some(1),
+        }
+    }
+
+    fn carried(plan: &Plan) -> (Carried, Vec<Progress>) {
+        let told = Mutex::new(Vec::new());
+        let never = AtomicBool::new(false);
+        let tell = |progress| told.lock().unwrap().push(progress);
+        let carried = carry_out(&Few, plan, &never, &tell).unwrap();
+        (carried, told.into_inner().unwrap())
+    }
+
+    #[test]
+    fn shares_of_runs_are_read_as_one_of_several() {
+        assert_eq!(" 2 / 4".parse(), Ok(Shard { part: 2, of: 4 }));
+        assert_eq!("4/4".parse(), Ok(Shard { part: 4, of: 4 }));
+        for wrong in ["0/4", "5/4", "1", "1/0", "a/2", "1/b", "-1/2"] {
+            assert_eq!(wrong.parse::<Shard>(), Err(NotAShard), "{wrong}");
+        }
+        let second = Shard { part: 2, of: 3 };
+        let held: Vec<u64> = (0..8).filter(|number| second.holds(*number)).collect();
+        assert_eq!(held, [1, 4, 7]);
+    }
+
+    #[test]
+    fn runs_that_are_missing_are_carried_out_and_counted_by_their_ending() {
+        let folder = tempfile::tempdir().unwrap();
+        let (first, told) = carried(&plan(folder.path(), Some("1/2"), false));
+        // Runs 0, 2, 4 and 6 of seven, where the run of 6 is also that of 5.
+        assert_eq!(first.table.numbers("number"), [0.0, 2.0, 4.0, 6.0]);
+        let Summary {
+            runs,
+            complete,
+            interlock,
+            failed,
+            invalid,
+            from_before,
+            missing,
+            ..
+        } = first.summary;
+        assert_eq!(
+            [runs, complete, interlock, failed, invalid],
+            [4, 2, 1, 0, 1]
+        );
+        assert_eq!((from_before, missing), (0, 3));
+        let progress = |done, of| Progress { done, of };
+        assert_eq!(told, [0, 1, 2, 3, 4].map(|done| progress(done, 4)));
+        let left = Left::new(&Few, Some(&Out::new(folder.path()))).unwrap();
+        assert_eq!(left.missing, [[1, 2], [3, 4]]);
+        let all = Left::new(&Few, None).unwrap();
+        assert_eq!(all.missing, [[0, 7]]);
+        let replaced = Out::new(folder.path()).replacing(true);
+        assert_eq!(Left::new(&Few, Some(&replaced)).unwrap().missing, [[0, 7]]);
+        let (whole, told) = carried(&plan(folder.path(), None, false));
+        assert_eq!(told, [5, 6, 7].map(|done| progress(done, 7)));
+        // Two runs that are the same have one row.
+        assert_eq!(
+            whole.table.texts("run"),
+            [0, 1, 2, 3, 4, 5].map(|n| format!("run-{n}"))
+        );
+        assert_eq!(whole.table.numbers("x")[1..4], [10.0, 20.0, 30.0]);
+        let Summary {
+            runs,
+            complete,
+            failed,
+            from_before,
+            missing,
+            ..
+        } = whole.summary;
+        assert_eq!(
+            [runs, complete, failed, from_before, missing],
+            [6, 3, 1, 5, 0]
+        );
+        // Replacing computes all runs again.
+        let (_, told) = carried(&plan(folder.path(), None, true));
+        assert_eq!((told[0], told.len()), (progress(0, 7), 8));
+    }
+
+    #[test]
+    fn an_interrupt_leaves_runs_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        let stop = AtomicBool::new(false);
+        let tell = |progress: Progress| stop.store(progress.done == 2, Ordering::Relaxed);
+        let plan = plan(folder.path(), None, false);
+        let carried = carry_out(&Few, &plan, &stop, &tell).unwrap();
+        assert_eq!((carried.summary.runs, carried.summary.missing), (2, 5));
+    }
+
+    #[test]
+    fn a_full_disk_is_reported_before_the_first_run() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(room(folder.path(), 1).is_ok());
+        let below = folder.path().join("not/yet/there");
+        assert!(room(&below, 1).is_ok());
+        let told = room(&below, u64::MAX).unwrap_err().to_string();
+        assert!(
+            told.contains("needs about 17592186044416 MB in this folder, and "),
+            "{told}"
+        );
+        assert!(!told.contains("and 0 MB are free"), "{told}");
+    }
+}

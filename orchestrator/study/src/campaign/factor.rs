@@ -463,4 +463,95 @@ mod tests {
             assert!(error.contains(expected), "{text}: {error}");
         }
     }
+
+    #[test]
+    fn numbers_and_units_are_read_as_they_are_written() {
+        let number = |own| Setting::Number(own);
+        assert_eq!(quantity(&number(1.5)), Ok((1.5, String::new())));
+        assert_eq!(quantity(&Setting::Integer(-2)), Ok((-2.0, String::new())));
+        assert_eq!(
+            quantity(&Setting::Text("2.5 kN".into())),
+            Ok((2.5, "kN".into()))
+        );
+        for wrong in [f64::NAN, f64::INFINITY] {
+            assert_eq!(
+                quantity(&number(wrong)),
+                Err(FactorError::NotANumber(Setting::Number(wrong).to_string()))
+            );
+        }
+        assert_eq!(share(&Setting::Text(" 5 % ".into())), Some(0.05));
+        assert_eq!(share(&Setting::Text("5".into())), None);
+        assert_eq!(share(&number(5.0)), None);
+        assert_eq!(deviation(&Setting::Text("2000 mm".into()), "m"), Ok(2.0));
+        assert_eq!(deviation(&number(2.0), ""), Ok(2.0));
+        assert_eq!(with_unit(2.0, "mm"), Setting::Text("2.0 mm".into()));
+        assert_eq!(with_unit(2.0, ""), number(2.0));
+    }
+
+    #[test]
+    fn ranges_hold_both_ends_and_their_steps() {
+        let Values::List(list) = read(r#"{ range = ["1 m", "2000 mm"], steps = 3 }"#).unwrap()
+        else {
+            panic!("no list");
+        };
+        let expected = ["1.0 m", "1.5 m", "2.0 m"];
+        assert_eq!(list, expected.map(|text| Setting::Text(text.into())));
+        assert!(read("{ range = [0, 1], steps = 2 }").is_ok());
+        for (text, expected) in [
+            (
+                "{ range = [0, 1], steps = 1 }",
+                "steps = 1; expected 2 to 1000000",
+            ),
+            (
+                "{ range = [1, 1], steps = 2 }",
+                "the range from 1 to 1 is empty",
+            ),
+            (
+                "{ uniform = [0, 1], steps = 2 }",
+                "`steps` belongs to `range`",
+            ),
+            (
+                "{ list = [0, 1], relative = true }",
+                "`relative` belongs to a distribution",
+            ),
+            (
+                "{ integers = [0, 1], relative = true }",
+                "`relative` belongs to a distribution",
+            ),
+            ("{ lognormal = [0, 1] }", "0 is not positive"),
+            ("{ normal = [true, 1] }", "is not a number"),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+        let list = read("[1, 2]").unwrap();
+        assert_eq!((list.count(), list.is_relative()), (Some(2), false));
+        assert_eq!(
+            [0.0, 0.49, 0.5, 1.0].map(|at| list.value(at)),
+            [1, 1, 2, 2].map(Setting::Integer)
+        );
+        let times = read("{ uniform = [0.5, 1.5], relative = true }").unwrap();
+        assert_eq!((times.count(), times.is_relative()), (None, true));
+        assert!(!read("{ uniform = [0.5, 1.5] }").unwrap().is_relative());
+        let same = read("{ integers = [4, 4] }").unwrap();
+        assert_eq!(
+            [0.0, 1.0].map(|at| same.value(at)),
+            [4, 4].map(Setting::Integer)
+        );
+    }
+
+    #[test]
+    fn quantiles_at_the_ends_are_finite() {
+        assert_eq!(Distribution::Uniform(2.0, 6.0).quantile(0.25), 3.0);
+        assert_eq!(Distribution::Integers(2, 5).quantile(0.5), 4.0);
+        let [low, high] = [0.0, 1.0].map(|at| Distribution::Normal(10.0, 2.0).quantile(at));
+        // A share of 2^-33 is 6.338 standard deviations off.
+        assert!((high - 10.0 - 2.0 * 6.338).abs() < 0.001, "{high}");
+        assert!((low + high - 20.0).abs() < 1e-6, "{low} {high}");
+        let relative = read(r#"{ lognormal = [2.0, "10 %"] }"#).unwrap();
+        let Setting::Number(own) = relative.value(0.841_344_746_068_543) else {
+            panic!("no number");
+        };
+        assert!((own - 2.0 * 0.1_f64.exp()).abs() < 1e-6, "{own}");
+    }
 }

@@ -124,4 +124,42 @@ mod tests {
         }
         assert_eq!(count, 1000);
     }
+
+    #[test]
+    fn lines_of_csv_have_units_of_factors_and_gaps_for_what_is_missing() {
+        let column = |name: &str, unit: Option<&str>, role, kind| Column {
+            name: name.to_string(),
+            unit: unit.map(str::to_string),
+            role,
+            kind,
+        };
+        let table = Table {
+            columns: vec![
+                column("number", None, Role::Run, Kind::Number),
+                column(
+                    "specimen.stiffness",
+                    Some("N/m"),
+                    Role::Factor,
+                    Kind::Number,
+                ),
+                column("delay_s", Some("s"), Role::Result, Kind::Number),
+                column("reason", None, Role::Ending, Kind::Text),
+            ],
+            rows: vec![
+                vec![0.0.into(), 14_000.5.into(), 0.012.into(), Cell::Missing],
+                vec![
+                    1.0.into(),
+                    1e-9.into(),
+                    Cell::Missing,
+                    "it, \"stopped\"".into(),
+                ],
+            ],
+        };
+        let mut text = Vec::new();
+        csv(&table, &mut text).unwrap();
+        assert_eq!(
+            String::from_utf8(text).unwrap(),
+            "number,specimen.stiffness [N/m],delay_s,reason\n0,14000.5,0.012,\n1,0.000000001,,\"it, \"\"stopped\"\"\"\n"
+        );
+    }
 }

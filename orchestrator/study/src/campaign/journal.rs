@@ -306,3 +306,156 @@ pub fn remove(folder: &Path) {
 pub fn is_there(folder: &Path) -> bool {
     folder.join(FOLDER).is_dir()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::{Kind, Role};
+    use super::*;
+
+    fn column(name: &str, role: Role) -> Column {
+        Column {
+            name: name.to_string(),
+            unit: None,
+            role,
+            kind: Kind::Number,
+        }
+    }
+
+    fn head(results: &[&str]) -> Head {
+        let mut columns = vec![column("number", Role::Run), column("run", Role::Run)];
+        columns.extend(results.iter().map(|name| column(name, Role::Result)));
+        let components = [("ShakeTable 3.0".to_string(), "ab".to_string())];
+        Head::of(components.into(), columns)
+    }
+
+    fn row(run: &str, cells: &[f64]) -> Row {
+        Row {
+            run: run.into(),
+            cells: cells.iter().map(|cell| Cell::from(*cell)).collect(),
+        }
+    }
+
+    fn path(folder: &Path) -> PathBuf {
+        folder.join(FOLDER).join("all.jsonl")
+    }
+
+    #[test]
+    fn rows_are_read_as_they_were_added_in_the_columns_that_are_asked_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        assert!(!is_there(folder) && read(folder, &head(&["a"])).unwrap().is_empty());
+        let mut journal = Journal::open(folder, "all", &head(&["a", "b"])).unwrap();
+        journal.add(&row("x", &[1.0, 2.0])).unwrap();
+        journal.add(&row("y", &[3.0, f64::NAN])).unwrap();
+        // One process at a time adds to it.
+        let error = Journal::open(folder, "all", &head(&["a"])).err().unwrap();
+        assert!(error.to_string().contains("another process"), "{error}");
+        drop(journal);
+        let rows = read(folder, &head(&["b", "a"])).unwrap();
+        assert_eq!(rows.len(), 2);
+        assert_eq!(rows["x"], [Cell::Number(2.0), Cell::Number(1.0)]);
+        assert_eq!(rows["y"], [Cell::Missing, Cell::Number(3.0)]);
+        // A column that they lack is that of another study.
+        assert!(read(folder, &head(&["a", "c"])).unwrap().is_empty());
+        // Other files in the folder are passed over.
+        fs::write(folder.join(FOLDER).join("notes.txt"), "no journal").unwrap();
+        assert_eq!(
+            read(folder, &head(&["a"])).unwrap()["x"],
+            [Cell::Number(1.0)]
+        );
+        assert!(is_there(folder));
+        remove(folder);
+        assert!(!is_there(folder));
+    }
+
+    #[test]
+    fn a_line_that_was_cut_off_is_dropped_and_the_head_is_written_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let add = |own: &Head, run: &str, cells: &[f64]| {
+            let mut journal = Journal::open(folder, "all", own).unwrap();
+            journal.add(&row(run, cells)).unwrap();
+        };
+        let one = head(&["a"]);
+        add(&one, "x", &[1.0]);
+        let whole = fs::read(path(folder)).unwrap();
+        let cut = [&whole[..], b"{\"run\":\"y\",\"cel"].concat();
+        fs::write(path(folder), cut).unwrap();
+        assert_eq!(read(folder, &one).unwrap().len(), 1);
+        add(&one, "y", &[2.0]);
+        let text = fs::read_to_string(path(folder)).unwrap();
+        assert_eq!(text.lines().count(), 3, "{text}");
+        assert!(text.starts_with(std::str::from_utf8(&whole).unwrap()));
+        // Rows behind another head have its columns.
+        add(&head(&["b", "a"]), "z", &[4.0, 3.0]);
+        let rows = read(folder, &one).unwrap();
+        assert_eq!(
+            ["x", "y", "z"].map(|run| rows[run].clone()),
+            [1.0, 2.0, 3.0].map(|own| vec![Cell::Number(own)])
+        );
+    }
+
+    #[test]
+    fn the_last_whole_line_is_found_in_blocks_from_the_end() {
+        let length = |bytes: &[u8]| {
+            let mut file = tempfile::tempfile().unwrap();
+            file.write_all(bytes).unwrap();
+            whole_length(&mut file).unwrap()
+        };
+        assert_eq!(length(b""), 0);
+        assert_eq!(length(b"no end"), 0);
+        assert_eq!(length(b"a\nbc"), 2);
+        let long = [b"ab\n".to_vec(), vec![b'x'; 200_000]].concat();
+        assert_eq!(length(&long), 3);
+        let ended = [long, b"\n".to_vec()].concat();
+        assert_eq!(length(&ended), ended.len() as u64);
+    }
+
+    #[test]
+    fn a_damaged_line_is_named_and_rows_of_other_programs_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let own = head(&["a"]);
+        let mut journal = Journal::open(folder, "all", &own).unwrap();
+        journal.add(&row("x", &[1.0])).unwrap();
+        drop(journal);
+        let whole = fs::read_to_string(path(folder)).unwrap();
+        let told = |text: String| {
+            fs::write(path(folder), text).unwrap();
+            read(folder, &own).unwrap_err().to_string()
+        };
+        let damaged = told(format!("{whole}nonsense\n"));
+        assert!(
+            damaged.contains("all.jsonl") && damaged.contains("line 3 is not a journal entry"),
+            "{damaged}"
+        );
+        let missing = told(format!("{whole}{{\"run\":\"y\",\"cells\":[]}}\n"));
+        assert!(
+            missing.contains("line 3: a row with missing cells"),
+            "{missing}"
+        );
+        let version = told(whole.replace(env!("CARGO_PKG_VERSION"), "0.0.1"));
+        let expected = format!(
+            "line 1: was made by shakebench 0.0.1 then, {} now",
+            env!("CARGO_PKG_VERSION")
+        );
+        assert!(version.contains(&expected), "{version}");
+        let platform = told(whole.replace(&own.platform, "abacus-sand"));
+        assert!(
+            platform.contains("was computed on abacus-sand then"),
+            "{platform}"
+        );
+        let component = told(whole.replace("\"ab\"", "\"cd\""));
+        assert!(
+            component.contains("was computed with another ShakeTable 3.0"),
+            "{component}"
+        );
+        // A component that only one of them has makes no difference.
+        fs::write(
+            path(folder),
+            whole.replace("ShakeTable 3.0", "Specimen 3.0"),
+        )
+        .unwrap();
+        assert_eq!(read(folder, &own).unwrap().len(), 1);
+    }
+}

@@ -551,4 +551,134 @@ mod tests {
         let (_, at, _) = found.unwrap();
         assert!((at[0] - 0.25).abs() < 1e-3 && at[1].abs() < 1e-3, "{at:?}");
     }
+
+    fn tuned() -> Tuned {
+        use plant::linear::margins::Margins;
+        let score = |quantile, median, stopped| Score {
+            quantile,
+            median,
+            stopped,
+            runs: 20,
+        };
+        let held = |is_stable, gain: Option<f64>| Held {
+            is_stable,
+            margins: Margins {
+                crossover: None,
+                phase_margin_deg: Some(45.25),
+                phase_crossover: None,
+                gain_margin_db: gain,
+            },
+            peak_sensitivity: 1.5,
+        };
+        let trial = |value: f64, quantile, keeps_margins| Trial {
+            values: vec![value, 0.5],
+            score: score(quantile, 2.0, 0),
+            held: None,
+            keeps_margins,
+        };
+        let parameter = |name: &str, unit: &str, after| Parameter {
+            name: name.into(),
+            unit: unit.into(),
+            low: 1.0,
+            high: 12.5,
+            before: 2.0,
+            after,
+        };
+        Tuned {
+            objective: "time_domain_percent".into(),
+            quantile: 0.95,
+            gain_margin_db: Some(6.0),
+            phase_margin_deg: None,
+            parameters: vec![
+                parameter("control.gain", "V/m", 4.5),
+                parameter("control.share", "", 0.25),
+            ],
+            held_out: Some(("seed".into(), vec!["4".into(), "5".into()])),
+            before: Side {
+                training: score(12.345, 8.0, 2),
+                held_out: Some(score(14.0, f64::NAN, 20)),
+                held: Some(held(false, None)),
+            },
+            after: Side {
+                training: score(3.25, 2.0, 0),
+                held_out: Some(score(4.5, 3.0, 0)),
+                held: Some(held(true, None)),
+            },
+            trials: vec![
+                trial(2.0, 12.345, false),
+                trial(3.0, 6.0, true),
+                trial(6.0, 9.0, true),
+                trial(4.5, 3.25, true),
+                trial(9.0, 1.0, false),
+            ],
+            ended: "the search has converged".into(),
+            wall_s: 1.0,
+            set: vec!["control.gain=4.5 V/m".into(), "control.share=0.25".into()],
+            identity: vec![("Runs".into(), "20".into())],
+        }
+    }
+
+    #[test]
+    fn the_page_of_a_search_compares_before_and_after() {
+        use pages::report::UnitSystem;
+        let found = tuned();
+        let text = expected::text_of(&page::page(&found), UnitSystem::Us);
+        let alone = Tuned {
+            held_out: None,
+            gain_margin_db: None,
+            before: Side {
+                held_out: None,
+                held: None,
+                ..found.before
+            },
+            after: Side {
+                held_out: None,
+                ..found.after
+            },
+            ..found.clone()
+        };
+        let alone = expected::text_of(&page::page(&alone), UnitSystem::Us);
+        let last = Tuned {
+            held_out: None,
+            ..found
+        };
+        let last = expected::text_of(&page::page(&last), UnitSystem::Us);
+        let text = [text, alone, last].join("\n======\n");
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "tuned.txt", &text);
+    }
+
+    #[test]
+    fn what_was_found_is_written_as_fixed_values_of_a_study() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let written = tuned().write(&Out::new(&out)).unwrap();
+        assert_eq!(written.len(), 3);
+        assert_eq!(
+            std::fs::read_to_string(out.join("tuned.toml")).unwrap(),
+            "# Found by `shakebench tune`; for [fixed] of a study.\n\
+             \"control.gain\" = \"4.5 V/m\"\n\"control.share\" = 0.25\n"
+        );
+        let json = std::fs::read_to_string(out.join("tuned.json")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        assert_eq!(json["trials"][1]["keeps_margins"], true);
+    }
+
+    #[test]
+    fn a_margin_is_kept_by_what_it_exceeds_the_one_that_is_asked_for() {
+        let found = tuned();
+        let trial = |held| {
+            Some(Trial {
+                held,
+                ..found.trials[0].clone()
+            })
+        };
+        let phase = |held: &Held| held.margins.phase_margin_deg;
+        let gain = |held: &Held| held.margins.gain_margin_db;
+        let stable = found.after.held;
+        assert_eq!(margin(trial(stable), phase, 40.0), 5.25);
+        assert_eq!(margin(trial(stable), gain, 6.0), 20.0);
+        assert_eq!(margin(trial(found.before.held), phase, 40.0), -20.0);
+        assert_eq!(margin(trial(None), phase, 40.0), -20.0);
+        assert_eq!(margin(None, phase, 40.0), -20.0);
+    }
 }

@@ -175,3 +175,135 @@ impl<'a> Runs<'a> {
         names.find_map(|name| self.list(name))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::table::Column;
+
+    fn table(columns: &[(&str, Role, Kind)], rows: Vec<Vec<Cell>>) -> Table {
+        let column = |(name, role, kind): &(&str, Role, Kind)| Column {
+            name: (*name).to_string(),
+            unit: None,
+            role: *role,
+            kind: *kind,
+        };
+        Table {
+            columns: columns.iter().map(column).collect(),
+            rows,
+        }
+    }
+
+    fn numbers(values: &[f64]) -> Table {
+        let rows = values.iter().map(|value| vec![Cell::from(*value)]);
+        table(&[("x", Role::Factor, Kind::Number)], rows.collect())
+    }
+
+    fn texts(values: &[&str]) -> Table {
+        let cell = |value: &str| match value {
+            "" => Cell::Missing,
+            text => text.into(),
+        };
+        let rows = values.iter().map(|value| vec![cell(value)]);
+        table(&[("controller", Role::Factor, Kind::Text)], rows.collect())
+    }
+
+    #[test]
+    fn numbers_are_a_list_if_they_are_few_and_repeat() {
+        let list = |table: &Table| {
+            let runs = Runs::of(table);
+            runs.list("x").map(|list| (list.values, list.places))
+        };
+        let (values, places) = list(&numbers(&[
+            2.0,
+            1.0,
+            f64::NAN,
+            0.25,
+            2e6,
+            1.0,
+            2.0,
+            -3.0,
+            1.0,
+            2.0,
+        ]))
+        .unwrap();
+        assert_eq!(values, ["-3", "0.2500", "1", "2", "2000000"]);
+        let at = |n| Some(n);
+        assert_eq!(
+            places,
+            [
+                at(3),
+                at(2),
+                None,
+                at(1),
+                at(4),
+                at(2),
+                at(3),
+                at(0),
+                at(2),
+                at(3)
+            ]
+        );
+        // Whole numbers from a million on are shown in four digits.
+        assert_eq!(
+            list(&numbers(&[1.5e6 + 0.5, 1e7, 1.5e6 + 0.5, 1e7]))
+                .unwrap()
+                .0,
+            ["1500000", "1.000e7"]
+        );
+        assert!(list(&numbers(&[1.0, 1.0])).is_none(), "one value");
+        assert!(list(&numbers(&[1.0, 2.0, 1.0])).is_none(), "too few runs");
+        assert!(list(&numbers(&[1.0, 2.0, 1.0, 2.0])).is_some());
+        let many =
+            |count: usize| -> Vec<f64> { (0..2 * count).map(|n| (n % count) as f64).collect() };
+        assert!(list(&numbers(&many(MOST_VALUES))).is_some());
+        assert!(list(&numbers(&many(MOST_VALUES + 1))).is_none());
+        assert!(Runs::of(&numbers(&[1.0])).list("y").is_none());
+    }
+
+    #[test]
+    fn texts_are_a_list_in_their_order_if_they_repeat() {
+        let own = texts(&["mpc", "lqg", "", "mpc", "lqg"]);
+        let runs = Runs::of(&own);
+        let list = runs.controllers().unwrap();
+        assert_eq!(list.values, ["mpc", "lqg"]);
+        assert_eq!((list.rows(0), list.rows(1)), (vec![0, 3], vec![1, 4]));
+        assert!(runs.motions().is_none());
+        assert!(Runs::of(&texts(&["a", "b", "c"])).controllers().is_none());
+        assert!(Runs::of(&texts(&["a", "a"])).controllers().is_none());
+        assert!(
+            Runs::of(&texts(&["a", "b", "a", "b"]))
+                .controllers()
+                .is_some()
+        );
+        // A column that is not a factor does not tell controllers apart.
+        let mut result = own.clone();
+        result.columns[0].role = Role::Result;
+        assert!(Runs::of(&result).controllers().is_none());
+    }
+
+    #[test]
+    fn endings_are_counted_by_their_words() {
+        let words = ["complete", "interlock", "failed", "invalid", "complete"];
+        let rows = words.iter().map(|word| vec![Cell::from(*word)]);
+        let own = table(&[("ended", Role::Ending, Kind::Text)], rows.collect());
+        let runs = Runs::of(&own);
+        assert_eq!(
+            runs.endings(&runs.all()),
+            Endings {
+                runs: 5,
+                complete: 2,
+                interlock: 1,
+                failed: 2
+            }
+        );
+        assert_eq!(runs.endings(&[1, 4]).complete, 1);
+        assert_eq!(
+            (runs.ended(1), runs.ended(9)),
+            (Ended::Interlock, Ended::Failed)
+        );
+        assert!(runs.varied().is_empty(), "an ending is not a factor");
+        assert_eq!(Runs::of(&numbers(&[1.0, 1.0, 2.0])).varied(), ["x"]);
+        assert!(Runs::of(&numbers(&[1.0, 1.0])).varied().is_empty());
+    }
+}
