@@ -523,3 +523,234 @@ impl Runs for Bench<'_> {
         self.run_with(number, &[])
     }
 }
+
+#[cfg(test)]
+/// A system file in `folder` with a component whose FMU has no library, and a study of it.
+pub(crate) fn made_study(folder: &std::path::Path, text: &str) -> Study {
+    let description = r#"<fmiModelDescription fmiVersion="3.0" modelName="Own" instantiationToken="1">
+        <CoSimulation modelIdentifier="Own"/>
+        <UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit><Unit name="V/m"><BaseUnit kg="1" m="1" s="-3" A="-1"/></Unit></UnitDefinitions>
+        <ModelVariables>
+        <Float64 name="y" valueReference="1" causality="output" unit="m"/>
+        <Float64 name="gain" valueReference="2" causality="parameter" variability="fixed" start="4" unit="V/m"/>
+        <Float64 name="share" valueReference="3" causality="parameter" variability="fixed" start="0"/>
+        <String name="word" valueReference="4" causality="parameter" variability="fixed"><Start value="a"/></String>
+        </ModelVariables><ModelStructure><Output valueReference="1"/></ModelStructure></fmiModelDescription>"#;
+    let entries = [(
+        "modelDescription.xml".to_string(),
+        description.as_bytes().to_vec(),
+    )];
+    pack::write_archive(&folder.join("own.fmu"), &entries.into(), None).unwrap();
+    let file = "name = \"own\"\n[components.own]\nfmu = \"own.fmu\"\n";
+    std::fs::write(folder.join("own.toml"), file).unwrap();
+    Study::parse(&folder.join("study.toml"), text.to_string()).unwrap()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STUDY: &str = r#"
+[study]
+runs = 4
+cross = ["own.gain"]
+[fixed]
+system = "own.toml"
+seed = 3
+[factors]
+"own.gain" = ["1 V/m", "0.002 V/mm"]
+scale = { uniform = [0.5, 1.5] }
+[limits]
+"own.y" = "2 mm"
+time_domain_percent = "5 %"
+"#;
+
+    fn numbers(cells: &[Cell]) -> Vec<Option<f64>> {
+        cells.iter().map(Cell::number).collect()
+    }
+
+    #[test]
+    fn columns_and_limits_have_the_units_of_their_variables() {
+        let folder = tempfile::tempdir().unwrap();
+        let own = made_study(folder.path(), STUDY);
+        let bench = Bench::new(&own, &Installation::default());
+        let columns = bench.columns().unwrap();
+        let shown = |column: &Column| {
+            let unit = column.unit.as_deref().unwrap_or("-");
+            format!(
+                "{} [{unit}] {:?} {:?}",
+                column.name, column.role, column.kind
+            )
+        };
+        let all: Vec<String> = columns.iter().map(shown).collect();
+        assert_eq!(
+            all[..5],
+            [
+                "number [-] Run Number",
+                "run [-] Run Text",
+                "own.gain [V/m] Factor Number",
+                "scale [-] Factor Number",
+                "pga_g [g] Result Number",
+            ]
+        );
+        assert_eq!(
+            all[all.len() - 4..],
+            [
+                "peak.own.y [m] Result Number",
+                "ended [-] Ending Text",
+                "ended_s [s] Ending Number",
+                "reason [-] Ending Text",
+            ]
+        );
+        assert_eq!(
+            bench.limits().unwrap(),
+            [
+                ("peak.own.y".to_string(), 0.002),
+                ("time_domain_percent".to_string(), 5.0)
+            ]
+        );
+        let told = |limits: &str| {
+            let own = made_study(
+                folder.path(),
+                &STUDY.replace("\"own.y\" = \"2 mm\"", limits),
+            );
+            let bench = Bench::new(&own, &Installation::default());
+            bench.limits().unwrap_err().to_string()
+        };
+        for (limits, expected) in [
+            (
+                "\"own.x\" = \"2 mm\"",
+                "[limits] `own.x` is not an output of own",
+            ),
+            (
+                "\"own.y\" = 2",
+                "[limits] peak.own.y: `2` has no unit; expected for example \"1 m\"",
+            ),
+            ("\"own.y\" = \"2 V\"", "[limits] peak.own.y: "),
+            (
+                "\"own.y\" = true",
+                "[limits] peak.own.y: `true` is not a number",
+            ),
+            ("pga_g = \"a %\"", "[limits] pga_g"),
+        ] {
+            let told = told(limits);
+            assert!(told.contains(expected), "{limits}: {told}");
+        }
+    }
+
+    #[test]
+    fn a_variable_has_its_value_and_unit_without_the_study() {
+        let folder = tempfile::tempdir().unwrap();
+        let own = made_study(folder.path(), STUDY);
+        let bench = Bench::new(&own, &Installation::default());
+        assert_eq!(bench.nominal("own.gain").unwrap(), (4.0, "V/m".to_string()));
+        assert_eq!(bench.nominal("own.share").unwrap(), (0.0, String::new()));
+        let told = |name: &str| bench.nominal(name).unwrap_err().to_string();
+        assert!(
+            told("own.gian").starts_with("`own.gian` is not a variable of own"),
+            "{}",
+            told("own.gian")
+        );
+        assert!(
+            told("own.gian").contains("own.gain"),
+            "{}",
+            told("own.gian")
+        );
+        assert_eq!(told("own.word"), "`own.word` is not a number");
+        let (_, assembled, _) = bench.request(&own.settings(0)).unwrap();
+        let system = &assembled.system;
+        assert_eq!(number_unit(system, "own.gain").as_deref(), Some("V/m"));
+        assert_eq!(number_unit(system, "own.share").as_deref(), Some(""));
+        assert_eq!(
+            (
+                number_unit(system, "own.word"),
+                number_unit(system, "own.x")
+            ),
+            (None, None)
+        );
+        assert_eq!(outputs(system).collect::<Vec<_>>(), ["own.y"]);
+        assert!(output(system, "own.y").is_some() && output(system, "own.gain").is_none());
+        let factor = |factor| times(system, "own.gain", &factor).map_err(|error| error.to_string());
+        assert_eq!(factor(Setting::Number(1.5)), Ok("6.0 V/m".to_string()));
+        assert_eq!(
+            factor(Setting::Text("a".into())),
+            Err("`a` is not a factor of `own.gain`".into())
+        );
+        let zero = times(system, "own.share", &Setting::Number(2.0))
+            .unwrap_err()
+            .to_string();
+        assert!(zero.contains("`own.share` is 0 in own"), "{zero}");
+    }
+
+    #[test]
+    fn a_run_that_cannot_begin_is_a_row_with_its_factors_and_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let own = made_study(folder.path(), STUDY);
+        let bench = Bench::new(&own, &Installation::default());
+        assert_eq!(bench.count(), 8);
+        let row = bench.run(1);
+        assert_eq!(row.run, own.name(&own.settings(1)));
+        assert_ne!(row.run, bench.name(0));
+        let cells = &row.cells;
+        assert_eq!(cells.len() + 2, bench.columns().unwrap().len());
+        // The second value of the crossed factor, in the unit of the variable.
+        assert_eq!(numbers(&cells[..1]), [Some(2.0)]);
+        let scale = cells[1].number().unwrap();
+        assert!((0.5..1.5).contains(&scale), "{scale}");
+        let [ended, at, reason] = &cells[cells.len() - 3..] else {
+            panic!("no ending")
+        };
+        assert_eq!((ended.text(), at), (Some(INVALID), &Cell::Missing));
+        assert!(
+            reason
+                .text()
+                .unwrap()
+                .starts_with("--duration: neither the system"),
+            "{reason:?}"
+        );
+        assert!(
+            cells[2..cells.len() - 3]
+                .iter()
+                .all(|cell| *cell == Cell::Missing)
+        );
+        let command = bench.command(1);
+        let place = folder.path().join("own.toml");
+        assert_eq!(
+            command,
+            format!(
+                "shakebench run {} --seed 3 --scale {scale:?} --set 'own.gain=0.002 V/mm'",
+                quoted(&place.display().to_string())
+            )
+        );
+        let (request, file) = bench.request_of(0).unwrap();
+        assert_eq!(
+            (request.set, &*file.name),
+            (vec!["own.gain=1 V/m".to_string()], "own")
+        );
+    }
+
+    #[test]
+    fn relative_factors_are_multiples_of_what_the_system_has() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = STUDY.replace("cross = [\"own.gain\"]", "").replace(
+            "[\"1 V/m\", \"0.002 V/mm\"]",
+            "{ uniform = [0.5, 1.0], relative = true }",
+        );
+        let own = made_study(folder.path(), &text);
+        let bench = Bench::new(&own, &Installation::default());
+        for number in 0..own.runs() {
+            let settings = own.settings(number);
+            let Setting::Number(factor) = settings[0] else {
+                panic!("{settings:?}")
+            };
+            let cells = bench.factors(&settings).unwrap();
+            assert_eq!(
+                numbers(&cells),
+                [
+                    Some(4.0 * factor),
+                    bench.study.factors[1].key.number(&settings[1]).ok()
+                ]
+            );
+        }
+    }
+}

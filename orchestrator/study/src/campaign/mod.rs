@@ -18,6 +18,8 @@ pub mod table;
 use std::path::{Path, PathBuf};
 
 pub use bench::Bench;
+#[cfg(test)]
+pub(crate) use bench::made_study;
 pub use carry_out::{Carried, Left, Plan, Progress, Shard, Summary, carry_out, rows};
 pub use design::{Design, Points};
 pub(crate) use factor::with_unit;

@@ -517,3 +517,229 @@ fn exclusive(fixed: &[(String, Key, Setting)], factors: &[Factor]) -> Result<(),
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::analysis::Ranked;
+
+    fn parse(text: &str) -> Result<Study, String> {
+        Study::parse(Path::new("some.toml"), text.to_string()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn crossed_factors_vary_fastest_and_the_last_of_them_first() {
+        let own = parse(
+            "[study]\ncross = [\"controller\", \"seed\"]\nruns = 3\n[fixed]\nplant = \"identified\"\n\
+             [factors]\ncontroller = [\"mpc\", \"lqg\"]\nseed = [1, 2, 3]\nscale = { uniform = [0.5, 1.5] }\n",
+        )
+        .unwrap();
+        assert_eq!((own.runs(), own.design), (18, Design::Sobol));
+        let texts = |number| -> Vec<String> {
+            own.settings(number)
+                .iter()
+                .map(ToString::to_string)
+                .collect()
+        };
+        let crossed: Vec<String> = (0..6).map(|number| texts(number)[..].join(" ")).collect();
+        let scale = &texts(0)[1];
+        let expected = ["mpc", "lqg"]
+            .map(|controller| [1, 2, 3].map(|seed| format!("{controller} {scale} {seed}")));
+        assert_eq!(crossed, expected.concat());
+        assert_ne!(&texts(6)[1], scale);
+        let ranked = own.ranked().unwrap();
+        assert_eq!(
+            ranked,
+            Ranked {
+                factor: "controller".into(),
+                among: Vec::new(),
+                crossings: 6
+            }
+        );
+        let names: Vec<&str> = own
+            .factors
+            .iter()
+            .map(|factor| factor.name.as_str())
+            .collect();
+        assert_eq!(names, ["controller", "scale", "seed"]);
+        assert_eq!(own.every_value().count(), 1 + 2 + 3);
+        assert_eq!(own.all_values(&own.settings(0)).count(), 4);
+        assert!(own.files().is_empty());
+    }
+
+    #[test]
+    fn a_run_is_named_by_what_it_is() {
+        let name = |text: &str, number| {
+            let own = parse(text).unwrap();
+            own.name(&own.settings(number))
+        };
+        let text = "[study]\n[factors]\nseed = [1, 2]\n\"table.mass\" = [\"5 kg\", \"6 kg\"]\n";
+        let first = name(text, 0);
+        assert_eq!(first.len(), 16);
+        // Whatever else varies, and in which order.
+        let other = text.replace("[1, 2]", "[7, 1]").replace("6 kg", "8 kg");
+        let same = (0..4).filter(|number| name(&other, *number) == first);
+        assert_eq!(same.count(), 1);
+        let all: std::collections::HashSet<String> =
+            (0..4).map(|number| name(text, number)).collect();
+        assert_eq!(all.len(), 4);
+        // The peak of a signal is another row; a limit of a figure is not.
+        assert_ne!(
+            name(&format!("{text}[limits]\n\"table.force\" = \"1 kN\"\n"), 0),
+            first
+        );
+        assert_eq!(name(&format!("{text}[limits]\npga_g = 1\n"), 0), first);
+        let relative = "[study]\nruns = 1\n[factors]\n\"table.mass\" = { uniform = [1.0, 2.0], relative = true }\n";
+        let plain = relative.replace(", relative = true", "");
+        assert_ne!(name(relative, 0), name(&plain, 0));
+    }
+
+    #[test]
+    fn files_count_by_what_they_hold() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, record) = (
+            folder.path().join("study.toml"),
+            folder.path().join("a.csv"),
+        );
+        let read = || {
+            Study::parse(
+                &path,
+                "[study]\n[factors]\nreference = [\"a.csv\"]\n".to_string(),
+            )
+        };
+        assert!(read().unwrap_err().to_string().contains("a.csv"));
+        std::fs::write(&record, "one").unwrap();
+        let own = read().unwrap();
+        let before = own.name(&own.settings(0));
+        assert_eq!(own.files()[&record], fmi_import::digest(b"one"));
+        std::fs::write(&record, "two").unwrap();
+        let own = read().unwrap();
+        assert_ne!(own.name(&own.settings(0)), before);
+        assert_eq!(own.folder(), folder.path());
+    }
+
+    #[test]
+    fn studies_at_fault_are_refused_by_place() {
+        for (text, expected) in [
+            ("[study]\n", "[factors] is missing: nothing varies"),
+            (
+                "[study]\ndesign = \"grid\"\n[factors]\nseed = [1]\n",
+                "[study] design: `grid` is unknown",
+            ),
+            (
+                "[study]\ncross = [\"sead\"]\n[factors]\nseed = [1]\n",
+                "[study] cross: `sead` is not a factor",
+            ),
+            (
+                "[study]\ncross = [\"scale\"]\n[factors]\nscale = { uniform = [1, 2] }\n",
+                "[study] cross: `scale` is not a list",
+            ),
+            (
+                "[study]\n[fixed]\nsead = 1\n[factors]\nseed = [1]\n",
+                "[fixed] sead: is an unknown key",
+            ),
+            (
+                "[study]\n[factors]\nseed = 1\n",
+                "[factors] seed: 1 is a single value",
+            ),
+            (
+                "[study]\n[factors]\nscale = { uniform = [1, 2], relative = true }\n",
+                "[factors] scale: `relative` belongs to a variable of an instance",
+            ),
+            (
+                "[study]\n[fixed]\nseed = 1\n[factors]\nseed = [1]\n",
+                "`seed` is fixed and varies",
+            ),
+            (
+                "[study]\n[fixed]\nsystem = \"mpc\"\n[factors]\ncontroller = [\"mpc\"]\n",
+                "`system` and `controller` are synonyms",
+            ),
+            (
+                "[study]\n[fixed]\nscale = 1\n[factors]\npga = [1]\n",
+                "`scale` and `pga` exclude each other",
+            ),
+            (
+                "[study]\n[factors]\nboth = { list = [1], of = [\"a.x\", \"a\"] }\n",
+                "[factors] both: `a` is not a variable",
+            ),
+            (
+                "[study]\n[factors]\nseed = { list = [1], of = [\"a.x\"] }\n",
+                "a factor with `of` needs its own name",
+            ),
+            (
+                "[study]\n[factors]\nown = { list = [1], of = [] }\n",
+                "`of` is empty",
+            ),
+        ] {
+            let told = parse(text).unwrap_err();
+            assert!(told.contains(expected), "{text}: {told}");
+        }
+    }
+
+    #[test]
+    fn variables_that_are_the_same_have_one_factor() {
+        let own = parse("[study]\n[factors]\nboth = { list = [1, 2], of = [\"a.x\", \"b.x\"] }\n")
+            .unwrap();
+        assert_eq!(
+            own.factors[0].key,
+            Key::Variables(vec!["a.x".into(), "b.x".into()])
+        );
+        assert_eq!((own.runs(), own.design), (2, Design::Full));
+        assert!(own.ranked().is_none());
+        let none = Table::default();
+        assert!(matches!(own.analysed(&none), analysis::Design::Other));
+    }
+
+    #[test]
+    fn the_rows_of_a_saltelli_design_are_found_by_their_names() {
+        let own = parse(
+            "[study]\ndesign = \"saltelli\"\nruns = 2\ncross = [\"controller\"]\n[factors]\n\
+             controller = [\"mpc\", \"lqg\"]\nscale = { uniform = [1, 2] }\n\"a.x\" = { uniform = [1, 2] }\n",
+        )
+        .unwrap();
+        let names: Vec<String> = (0..own.runs())
+            .map(|number| own.name(&own.settings(number)))
+            .collect();
+        let column = super::super::table::Column {
+            name: "run".into(),
+            unit: None,
+            role: super::super::table::Role::Run,
+            kind: super::super::table::Kind::Text,
+        };
+        let table = Table {
+            columns: vec![column],
+            rows: names
+                .iter()
+                .skip(1)
+                .map(|name| vec![name.as_str().into()])
+                .collect(),
+        };
+        let analysis::Design::Saltelli {
+            sampled,
+            crossed,
+            crossings,
+            rows,
+        } = own.analysed(&table)
+        else {
+            panic!("another design")
+        };
+        assert_eq!(
+            (sampled, crossed, crossings),
+            (
+                vec!["a.x".into(), "scale".into()],
+                vec!["controller".into()],
+                2
+            )
+        );
+        let known = |name: &String| names.iter().skip(1).rposition(|own| own == name);
+        let expected: Vec<Option<usize>> = names.iter().map(known).collect();
+        assert_eq!(rows, expected);
+    }
+
+    #[test]
+    fn the_studies_of_the_program_are_read_by_their_names() {
+        let own = Study::read(Path::new("rigs")).unwrap();
+        assert!(own.runs() > 1);
+        assert!(Study::read(Path::new("rig")).is_err());
+    }
+}

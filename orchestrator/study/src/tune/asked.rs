@@ -151,3 +151,111 @@ impl Asked {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::Bench;
+    use pack::Installation;
+
+    const STUDY: &str = "[study]\n[fixed]\nsystem = \"own.toml\"\n[factors]\nseed = [1, 2]\n";
+
+    fn asked(tune: &str) -> Result<Asked, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let own = crate::campaign::made_study(folder.path(), &format!("{STUDY}{tune}"));
+        let bench = Bench::new(&own, &Installation::default());
+        Asked::read(&own, &bench).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_search_has_its_parameters_in_their_units_and_usual_settings() {
+        let own = asked("[tune.parameters]\n\"own.gain\" = [\"0.001 V/mm\", \"9 V/m\"]\n\"own.share\" = [-1, 2.5]\n").unwrap();
+        assert_eq!(
+            (&*own.objective, own.quantile, own.evaluations),
+            ("time_domain_percent", 0.95, 60)
+        );
+        assert_eq!(
+            (own.share, own.gain_margin, own.phase_margin),
+            (0.3, None, None)
+        );
+        let shown = |own: &Parameter| {
+            (
+                own.name.clone(),
+                own.unit.clone(),
+                [own.low, own.high, own.before, own.after],
+            )
+        };
+        let all: Vec<_> = own.parameters.iter().map(shown).collect();
+        assert_eq!(
+            all[0],
+            ("own.gain".into(), "V/m".into(), [1.0, 9.0, 4.0, 4.0])
+        );
+        assert_eq!(
+            all[1],
+            ("own.share".into(), String::new(), [-1.0, 2.5, 0.0, 0.0])
+        );
+        let own = asked(
+            "[tune]\nobjective = \"delay_s\"\nquantile = 0.5\nevaluations = 3\nhold_out = 0.0\n\
+             gain_margin = \"6 dB\"\nphase_margin = 45\n[tune.parameters]\n\"own.share\" = [0, 1]\n",
+        )
+        .unwrap();
+        assert_eq!(
+            (&*own.objective, own.quantile, own.evaluations, own.share),
+            ("delay_s", 0.5, 3, 0.0)
+        );
+        assert_eq!((own.gain_margin, own.phase_margin), (Some(6.0), Some(45.0)));
+    }
+
+    #[test]
+    fn a_search_at_fault_is_refused_with_what_is_expected() {
+        let share = "[tune.parameters]\n\"own.share\" = [0, 1]\n";
+        for (tune, expected) in [
+            (String::new(), "[tune] is missing; expected for example"),
+            (
+                format!("[tune]\nquantile = 1.5\n{share}"),
+                "quantile = 1.5; expected 0 to 1",
+            ),
+            (
+                format!("[tune]\nhold_out = 1.0\n{share}"),
+                "hold_out = 1; expected 0 to 1",
+            ),
+            (
+                format!("[tune]\nevaluations = 2\n{share}"),
+                "evaluations = 2; expected at least 3, two more",
+            ),
+            (
+                format!("[tune]\ngain_margin = \"six\"\n{share}"),
+                "gain_margin: expected a number of dB",
+            ),
+            (
+                format!("[tune]\nphase_margin = true\n{share}"),
+                "phase_margin: expected a number of deg",
+            ),
+            ("[tune.parameters]\n".into(), "parameters: there is none"),
+            (
+                "[tune.parameters]\nseed = [0, 1]\n".into(),
+                "parameters.seed: the study already fixes or varies it",
+            ),
+            (
+                "[tune.parameters]\nsystem = [0, 1]\n".into(),
+                "parameters.system: the study already fixes",
+            ),
+            (
+                "[tune.parameters]\n\"own.gain\" = [0, 1]\n".into(),
+                "`0` has no unit; expected for example \"1 V/m\"",
+            ),
+            (
+                "[tune.parameters]\n\"own.share\" = [1, 1]\n".into(),
+                "the range from 1 to 1 is empty",
+            ),
+            (
+                "[tune.parameters]\n\"own.none\" = [0, 1]\n".into(),
+                "`own.none` is not a variable of own",
+            ),
+            ("[tune]\nother = 1\n[tune.parameters]\n".into(), "other"),
+        ] {
+            let told = asked(&tune).err().unwrap_or_default();
+            assert!(told.contains(expected), "{tune}: {told}");
+        }
+    }
+}

@@ -106,3 +106,55 @@ fn break_at_valve(file: &mut SystemFile) -> Result<String, Error> {
     file.connect(Origin::output(PUSHER, "y"), valve);
     Ok(format!("{PUSHER}.y"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmi_system::Link;
+
+    fn file(links: &[&str]) -> SystemFile {
+        let mut file = SystemFile::default();
+        let sampled = ComponentFile::new("DisplacementPid").period(Setting::Text("4 ms".into()));
+        file.add("control", sampled.clone());
+        file.add("interlock", sampled);
+        file.add("table", ComponentFile::new("ShakeTable"));
+        let links = links
+            .iter()
+            .map(|text| Link::try_from((*text).to_string()).unwrap());
+        file.connections = links.collect();
+        file
+    }
+
+    #[test]
+    fn the_loop_is_broken_between_the_last_command_and_the_valve() {
+        let mut own = file(&[
+            "control.valve_command -> interlock.valve_command",
+            "interlock.valve_command -> table.valve_command",
+        ]);
+        assert_eq!(break_at_valve(&mut own).unwrap(), "push_at_the_valve.y");
+        let links: Vec<String> = own.connections.iter().map(ToString::to_string).collect();
+        assert_eq!(
+            links,
+            [
+                "control.valve_command -> interlock.valve_command",
+                "interlock.valve_command -> push_at_the_valve.u",
+                "push_at_the_valve.y -> table.valve_command",
+            ]
+        );
+        let pusher = &own.components[PUSHER];
+        assert_eq!(
+            (&*pusher.fmu, &pusher.period),
+            ("SignalPath", &Some(Setting::Text("4 ms".into())))
+        );
+    }
+
+    #[test]
+    fn a_system_without_a_valve_has_no_margins() {
+        let mut own = file(&["control.valve_command -> interlock.valve_command"]);
+        let told = break_at_valve(&mut own).unwrap_err().to_string();
+        assert!(
+            told.contains("nothing drives a `valve_command` of its plant"),
+            "{told}"
+        );
+    }
+}
