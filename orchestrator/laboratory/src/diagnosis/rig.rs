@@ -190,7 +190,7 @@ fn close_look(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
         let block = &errors[start..start + length];
         block.iter().filter(|e| e.is_finite()).map(|e| e * e).sum()
     };
-    let worst = (0..samples.saturating_sub(length) / length.max(1))
+    let worst = (0..samples / length.max(1))
         .map(|block| block * length)
         .max_by(|&a, &b| sum(a).total_cmp(&sum(b)))
         .unwrap_or(0);
