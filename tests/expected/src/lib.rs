@@ -152,6 +152,12 @@ fn spread(values: impl Iterator<Item = f64>) -> String {
     let least = values.iter().copied().fold(f64::INFINITY, f64::min);
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let [least, largest, mean] = [least, largest, mean].map(|value| significant(value, 4));
+    // What rounding leaves of a zero differs between machines.
+    let size = least.abs().max(largest.abs());
+    let shown = |value: f64| match value.abs() < 1e-9 * size {
+        true => "0".to_string(),
+        false => significant(value, 4),
+    };
+    let [least, largest, mean] = [least, largest, mean].map(shown);
     format!("{} from {least} to {largest}, mean {mean}", values.len())
 }
