@@ -11,6 +11,9 @@ pub mod figures;
 pub mod identify;
 pub mod iteration;
 pub mod json;
+#[cfg(test)]
+#[path = "tests/made.rs"]
+mod made;
 pub mod qualify;
 pub mod results;
 pub mod run;

@@ -566,4 +566,73 @@ mod tests {
         let metric = out.in_units(Some(UnitSystem::Si)).folder();
         assert_eq!((metric.units(), metric.replaces()), (UnitSystem::Si, true));
     }
+
+    #[test]
+    fn an_unused_folder_has_the_first_free_number() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        let out = Out::new(place("run"));
+        let never = |_: &Path| false;
+        assert_eq!(&*unused(&out, never), place("run"));
+        for name in ["run", "run-2", "run-4"] {
+            fs::create_dir(place(name)).unwrap();
+        }
+        assert_eq!(&*unused(&out, never), place("run-3"));
+        // One that holds the results of the same command is used again.
+        assert_eq!(&*unused(&out, |own| own.ends_with("run-2")), place("run-2"));
+        assert_eq!(&*unused(&out.clone().replacing(true), never), place("run"));
+        assert_eq!(&*Out::new("model.toml").folder(), Path::new("."));
+        assert_eq!(&*Out::new("a/model.toml").folder(), Path::new("a"));
+    }
+
+    #[test]
+    fn what_was_kept_of_results_without_room_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("results.csv");
+        let saved = |names: &[&str]| -> Vec<PathBuf> { names.iter().map(PathBuf::from).collect() };
+        assert_eq!(kept(&[], &file), "no file is complete");
+        assert_eq!(
+            kept(&saved(&["a.csv"]), &file),
+            "one file is complete: `a.csv`"
+        );
+        assert_eq!(
+            kept(&saved(&["a.csv", "b", "results.csv.part"]), &file),
+            "these files are complete: `a.csv`, `b`; `results.csv.part` holds the first lines of `results.csv`"
+        );
+        let full = |kind: io::ErrorKind| is_full(&io::Error::from(kind));
+        assert!(full(io::ErrorKind::StorageFull) && full(io::ErrorKind::QuotaExceeded));
+        assert!(!full(io::ErrorKind::NotFound));
+        let wrapped = csv::Error::from(io::Error::from(io::ErrorKind::StorageFull));
+        assert!(is_full(&io::Error::other(wrapped)));
+    }
+
+    #[test]
+    fn files_of_an_earlier_run_do_not_stay_and_data_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        let out = Out::new(folder.path());
+        fs::write(place("old.html"), "").unwrap();
+        fs::write(place("data.csv"), "1").unwrap();
+        let begin = |text: &str, out: &Out| {
+            let mut results = Results::begin(out).unwrap();
+            results.write_text("data.csv", text).unwrap();
+            results.write_text("page.html", text).unwrap();
+            results.replaces(&["old.html", "page.html"]);
+            results
+        };
+        let told = begin("2", &out).finish().unwrap_err().to_string();
+        assert!(
+            told.contains("data.csv: already exists with different content"),
+            "{told}"
+        );
+        assert!(place("old.html").exists());
+        begin("1", &out).finish().unwrap();
+        assert!(!place("old.html").exists() && place("page.html").exists());
+        let mut other = begin("2", &out);
+        other.supersede();
+        other.finish().unwrap();
+        assert_eq!(fs::read_to_string(place("data.csv")).unwrap(), "2");
+        begin("3", &out.clone().replacing(true)).finish().unwrap();
+        assert_eq!(fs::read_to_string(place("data.csv")).unwrap(), "3");
+    }
 }

@@ -111,3 +111,103 @@ impl MotionSummary {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn motion(name: &str, displacement: &[f64], acceleration: &[f64]) -> Motion {
+        Motion {
+            name: name.into(),
+            dt: 0.5,
+            displacement: displacement.to_vec(),
+            velocity: vec![0.0; displacement.len()],
+            acceleration: acceleration.to_vec(),
+            notes: Vec::new(),
+            seed: None,
+            across: None,
+        }
+    }
+
+    #[test]
+    fn an_axis_at_rest_is_measured_by_the_peaks_of_the_other() {
+        let wanted = motion("wave", &[0.0, -0.2, 0.1, 9.0], &[0.0, 4.0, -5.0, 9.0]);
+        let cross = CrossMotion::new(&[0.01, -0.01, 0.01], &[0.3, 0.4, 0.0], &wanted).unwrap();
+        // Of the reference only what was played counts.
+        assert!((cross.displacement_percent - 5.0).abs() < 1e-9, "{cross:?}");
+        let rms = (0.25_f64 / 3.0).sqrt();
+        assert!(
+            (cross.acceleration_percent - 100.0 * rms / 5.0).abs() < 1e-9,
+            "{cross:?}"
+        );
+        assert_eq!(
+            (cross.peak_displacement_m, cross.peak_acceleration_m_s2),
+            (0.01, 0.4)
+        );
+        let rest = motion("rest", &[0.0; 4], &[0.0; 4]);
+        assert!(CrossMotion::new(&[0.1], &[0.1], &rest).is_none());
+        let summary = MotionSummary::of(&wanted);
+        assert_eq!(
+            (
+                &*summary.name,
+                summary.duration_s,
+                summary.peak_displacement_m
+            ),
+            ("wave", 1.5, 9.0)
+        );
+        assert!((summary.pga_g - 9.0 / STANDARD_GRAVITY).abs() < 1e-12);
+    }
+
+    #[test]
+    fn both_axes_are_measured_where_the_run_was_whole() {
+        let wave: Vec<f64> = (0..400).map(|n| (0.1 * f64::from(n)).sin()).collect();
+        let still = vec![0.0; wave.len()];
+        let both = motion("x", &wave, &wave).along_two_axes(motion("y", &still, &still));
+        let links: Vec<Link> = [
+            "reference.displacement -> control.u",
+            "control.valve_command -> table.valve_command",
+            "reference.displacement_y -> control_y.u",
+            "control_y.valve_command -> table_y.valve_command",
+        ]
+        .map(|text| Link::try_from(text.to_string()).unwrap())
+        .to_vec();
+        let names = ["table", "table_y"];
+        let columns = names.iter().flat_map(|name| {
+            let outputs = ["displacement", "velocity", "acceleration"];
+            outputs.map(|output| format!("{name}.{output}"))
+        });
+        let columns = std::iter::once("time".to_string()).chain(columns).collect();
+        let mut record = Record::with_capacity(columns, wave.len());
+        for (n, x) in wave.iter().enumerate() {
+            record.push(
+                0.5 * n as f64,
+                &[0.9 * x, 0.0, 0.8 * x, 0.01, 0.0, 0.02],
+                &[],
+            );
+        }
+        let found = tables(names.into_iter(), &links, &record);
+        let all = measure(found.as_ref(), &both, &record, true);
+        let [x, y] = &all[..] else {
+            panic!("{} axes", all.len())
+        };
+        assert_eq!(
+            (&*x.axis, &*x.motion.name, &*y.axis, &*y.motion.name),
+            ("x", "x", "y", "y")
+        );
+        assert!(x.at_rest.is_none() && y.tracking.is_none());
+        let tracking = x.tracking.unwrap();
+        // A fifth of the acceleration is missing.
+        assert!(
+            (tracking.peak_acceleration_error - 0.2 * tracking.peak_acceleration / 0.8).abs()
+                < 1e-9
+        );
+        assert!((y.at_rest.unwrap().peak_displacement_m - 0.01).abs() < 1e-12);
+        let all = measure(found.as_ref(), &both, &record, false);
+        assert!(
+            all.iter()
+                .all(|own| own.tracking.is_none() && own.at_rest.is_none())
+        );
+        assert!(measure(None, &both, &record, true).is_empty());
+        assert!(measure(found.as_ref(), &motion("x", &wave, &wave), &record, true).is_empty());
+    }
+}

@@ -287,3 +287,130 @@ fn replace(folder: &Path, name: &str, content: &[u8]) -> io::Result<()> {
     file.sync_data()?;
     fs::rename(new, folder.join(name))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+    use crate::run::experiment::Request;
+
+    fn moment(tick: usize) -> Checkpoint {
+        let json = serde_json::json!({
+            "tick": tick, "time": 0.002 * tick as f64, "numbers": [1.0, 2.0], "exact": [], "last_numbers": [],
+            "last_exact": [], "tripped": null, "variable": null, "parts": [], "wall": 0.5, "changes": [],
+        });
+        serde_json::from_value(json).unwrap()
+    }
+
+    fn columns() -> (Vec<String>, Vec<String>) {
+        (
+            ["time", "a.x"].map(String::from).to_vec(),
+            vec!["a.text".into()],
+        )
+    }
+
+    /// So many rows, each with a number and a text.
+    fn rows(count: usize) -> Record {
+        let (numbers, texts) = columns();
+        let mut record = Record::with_capacity(numbers, count).beside(&texts);
+        for n in 0..count {
+            let text = Datum::Text(format!("row {n}").into_bytes());
+            record.push(n as f64, &[0.1 * n as f64], &[text]);
+        }
+        record
+    }
+
+    #[test]
+    fn a_run_goes_on_from_its_last_checkpoint() {
+        let folder = tempfile::tempdir().unwrap();
+        let (folder, manifest) = (
+            folder.path(),
+            made::manifest(&Request::built_in("mpc"), &made::wave("wave", 5)),
+        );
+        assert!(!is_there(folder));
+        let none = read(folder).unwrap_err().to_string();
+        assert!(none.contains("holds no checkpoint"), "{none}");
+        let mut kept = Checkpoints::begin(folder, &manifest, (2, 100), None).unwrap();
+        assert!(
+            Checkpoints::begin(folder, &manifest, (2, 100), None).is_err(),
+            "another run saves here"
+        );
+        kept.keep(&moment(3), &rows(3)).unwrap();
+        kept.keep(&moment(5), &rows(5)).unwrap();
+        drop(kept);
+        assert!(is_there(folder));
+        // What was written behind the last moment is of no use.
+        let path = folder.join(FOLDER).join(ROWS);
+        let mut file = OpenOptions::new().append(true).open(&path).unwrap();
+        file.write_all(b"more").unwrap();
+        let found = read(folder).unwrap();
+        assert_eq!(
+            (found.checkpoint.tick, found.record_every, found.every),
+            (5, 2, 100)
+        );
+        assert_eq!(found.manifest, manifest);
+        assert_eq!(
+            (found.record.len(), found.record.column("a.x").unwrap()[4]),
+            (5, 0.4)
+        );
+        assert_eq!(found.record.exact(3), [Datum::Text(b"row 3".to_vec())]);
+        let mut kept = Checkpoints::begin(folder, &manifest, (2, 100), Some(&found)).unwrap();
+        kept.keep(&moment(9), &rows(9)).unwrap();
+        drop(kept);
+        let found = read(folder).unwrap();
+        assert_eq!((found.checkpoint.tick, found.record.len()), (9, 9));
+        assert_eq!(found.record.exact(8), [Datum::Text(b"row 8".to_vec())]);
+        remove(folder);
+        assert!(!is_there(folder) && !folder.join(FOLDER).exists());
+    }
+
+    #[test]
+    fn a_damaged_checkpoint_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let manifest = made::manifest(&Request::built_in("mpc"), &made::wave("wave", 5));
+        let mut kept = Checkpoints::begin(folder, &manifest, (1, 10), None).unwrap();
+        kept.keep(&moment(3), &rows(3)).unwrap();
+        drop(kept);
+        let [state, path] = [STATE, ROWS].map(|name| folder.join(FOLDER).join(name));
+        let (whole, bytes) = (fs::read(&state).unwrap(), fs::read(&path).unwrap());
+        let told = |state_now: &[u8], rows_now: &[u8]| {
+            fs::write(&state, state_now).unwrap();
+            fs::write(&path, rows_now).unwrap();
+            read(folder).map(|_| ()).map_err(|error| error.to_string())
+        };
+        assert_eq!(told(&whole, &bytes), Ok(()));
+        let mut changed = whole.clone();
+        *changed.last_mut().unwrap() ^= 1;
+        let mut other = bytes.clone();
+        other[2] ^= 1;
+        for (state, rows, expected) in [
+            (&b"else"[..], &bytes[..], "is not a checkpoint"),
+            (&whole[..20], &bytes, "is cut off"),
+            (&changed, &bytes, "its checksum differs"),
+            (&whole, &other, "its content has changed"),
+            (&whole, &bytes[1..], "its content has changed"),
+        ] {
+            let error = told(state, rows).unwrap_err();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn another_run_does_not_begin_over_one_that_is_not_finished() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::new(folder.path());
+        assert!(refuse_unfinished(&out).is_ok());
+        let manifest = made::manifest(&Request::built_in("mpc"), &made::wave("wave", 5));
+        let mut kept = Checkpoints::begin(&out, &manifest, (1, 10), None).unwrap();
+        kept.keep(&moment(3), &rows(3)).unwrap();
+        drop(kept);
+        let told = refuse_unfinished(&out).unwrap_err().to_string();
+        assert!(
+            told.contains("has not been finished; expected `shakebench run --resume"),
+            "{told}"
+        );
+        assert!(refuse_unfinished(&out.clone().replacing(true)).is_ok());
+        assert!(!is_there(&out));
+    }
+}

@@ -233,3 +233,113 @@ fn digest<'a>(values: impl Iterator<Item = &'a f64>) -> String {
     values.for_each(|value| sum.update(value.to_bits().to_le_bytes()));
     hexadecimal(&sum.finalize())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+    use serde_json::json;
+
+    #[test]
+    fn a_manifest_holds_values_units_and_defaults_that_differ() {
+        let motion = made::wave("wave", 10);
+        let own = made::manifest(&Request::built_in("mpc"), &motion);
+        let control = &own.components["control"];
+        assert_eq!(
+            (&*control.model, &*control.fmi, control.period_s),
+            ("control", "3.0", Some(0.002))
+        );
+        let unit = |unit: &str| Some(unit.to_string());
+        assert_eq!(
+            control.parameters["proportional_gain"],
+            (json!(196.85), unit("V/m"))
+        );
+        assert_eq!(control.parameters["valve_limit"], (json!(10), unit("V")));
+        assert_eq!(control.defaults.len(), 1);
+        assert_eq!(control.defaults["proportional_gain"], json!(137.8));
+        assert!(own.components["table"].defaults.is_empty());
+        assert_eq!(
+            (own.samples, &*own.motion.name, own.motion.dt_s),
+            (10, "wave", 0.002)
+        );
+        // A single bit of the motion changes its checksum.
+        let mut other = motion.clone();
+        other.velocity[3] = -other.velocity[3];
+        assert_ne!(MotionEntry::of(&other).sha256, own.motion.sha256);
+        let both = MotionEntry::of(&motion.clone().along_two_axes(other));
+        assert_eq!(both.sha256, own.motion.sha256);
+        assert!(
+            both.across
+                .is_some_and(|across| across.sha256 != own.motion.sha256)
+        );
+        assert_eq!(
+            digest([1.0].iter()),
+            fmi_import::digest(&1.0_f64.to_le_bytes())
+        );
+    }
+
+    #[test]
+    fn values_differ_by_what_they_are_not_by_how_they_are_written() {
+        for (one, other, expected) in [
+            (json!(1), json!(1.0), false),
+            (json!(true), json!(1), false),
+            (json!(false), json!(0.0), false),
+            (json!(1), json!(2), true),
+            (json!("a"), json!("a"), false),
+            (json!("a"), json!("b"), true),
+            (json!("1"), json!(1), true),
+        ] {
+            assert_eq!(differ(&one, &other), expected, "{one} {other}");
+        }
+        assert_eq!(
+            (start("2.5"), start("true"), start("word")),
+            (json!(2.5), json!(true), json!("word"))
+        );
+    }
+
+    #[test]
+    fn a_repetition_that_differs_is_told_in_what() {
+        let motion = made::wave("wave", 10);
+        let own = made::manifest(&Request::built_in("mpc"), &motion);
+        assert!(own.differences(&own).is_empty());
+        let mut again = own.clone();
+        again.shakebench = "0.0.1".into();
+        again.platform = "abacus".into();
+        again.motion.sha256 = "other".into();
+        again.motion.across = Some(Box::new(again.motion.clone()));
+        again.results_sha256 = "results".into();
+        again.connections.pop();
+        again.components.remove("specimen");
+        let control = again.components.get_mut("control").unwrap();
+        control.sha256 = "fmu".into();
+        control.parameters.remove("valve_limit");
+        control.parameters.get_mut("proportional_gain").unwrap().0 = json!(2);
+        again.changes.push(Change {
+            variable: "control.proportional_gain".into(),
+            time_s: 0.5,
+            sample: 250,
+            samples: 500,
+            from: 1.0,
+            to: 2.0,
+        });
+        let found = own.differences(&again);
+        let sum = &own.motion.sha256;
+        let expected = [
+            format!("version: {} then, 0.0.1 now", env!("CARGO_PKG_VERSION")),
+            format!("platform: {} then, abacus now", own.platform),
+            format!("motion: {sum} then, other now"),
+            "motion along y: none then, other now".into(),
+            format!("FMU of `control`: {} then, fmu now", own.components["control"].sha256),
+            "`control.proportional_gain`: 196.85 then, 2 now".into(),
+            "`control.valve_limit`: 10 then, none now".into(),
+            "component `specimen`: there then, not now".into(),
+            "changes during the run: none then, `control.proportional_gain` from 1.000 to 2.000 at 0.500 s now".into(),
+            "connections: reference.displacement -> control.reference_displacement, \
+             control.valve_command -> table.valve_command then, \
+             reference.displacement -> control.reference_displacement now"
+                .into(),
+            "results:  then, results now".into(),
+        ];
+        assert_eq!(found, expected);
+    }
+}

@@ -154,3 +154,138 @@ fn source(request: &Request, file: &SystemFile) -> Result<Source, Error> {
         (None, None) => Source::Seed,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+
+    fn file(links: &[&str], experiment: &str) -> SystemFile {
+        let text =
+            format!("name = \"own\"\n[experiment]\n{experiment}\n[components.a]\nfmu = \"A\"\n");
+        let mut file = SystemFile::parse("own", &text).unwrap();
+        file.connections = made::links(links);
+        file.directory = Some("folder".into());
+        file
+    }
+
+    fn request() -> Request {
+        Request {
+            seed: 5,
+            ..Request::built_in("own.toml")
+        }
+    }
+
+    fn shown(request: &Request, file: &SystemFile) -> String {
+        match source(request, file) {
+            Ok(Source::Record(path)) => format!("record {}", path.display()),
+            Ok(Source::Reference(path)) => format!("reference {}", path.display()),
+            Ok(Source::Seed) => "seed".to_string(),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn what_is_asked_for_is_played_before_what_the_system_plays() {
+        let record = file(&[], "record = \"a.AT2\"");
+        let reference = file(&[], "reference = \"a.csv\"");
+        assert_eq!(shown(&request(), &file(&[], "")), "seed");
+        assert_eq!(shown(&request(), &record), "record folder/a.AT2");
+        assert_eq!(shown(&request(), &reference), "reference folder/a.csv");
+        let asked = Request {
+            record: Some("b.AT2".into()),
+            ..request()
+        };
+        assert_eq!(shown(&asked, &record), "record b.AT2");
+        assert_eq!(shown(&asked, &reference), "record b.AT2");
+        let asked = Request {
+            reference: Some("b.csv".into()),
+            ..request()
+        };
+        assert_eq!(shown(&asked, &record), "reference b.csv");
+        let both = file(&[], "record = \"a.AT2\"\nreference = \"a.csv\"");
+        let told = shown(&request(), &both);
+        assert!(
+            told.contains("record and reference are both given"),
+            "{told}"
+        );
+        assert_eq!(shown(&asked, &both), "reference b.csv");
+    }
+
+    #[test]
+    fn a_second_axis_rests_or_has_a_motion_of_its_own() {
+        let single = file(&["reference.displacement -> a.u"], "");
+        let both = file(
+            &[
+                "reference.displacement -> a.u",
+                "reference.displacement_y -> a.v",
+            ],
+            "",
+        );
+        assert!(!is_biaxial(&single) && is_biaxial(&both));
+        let motions = Motions::default();
+        let one = motions.find(&request(), &single).unwrap();
+        assert_eq!(
+            (one.seed, one.across.is_none(), one.dt),
+            (Some(5), true, 0.002)
+        );
+        let two = motions.find(&request(), &both).unwrap();
+        let across = two.across.unwrap();
+        assert_eq!((two.seed, across.seed), (Some(5), Some(105)));
+        assert_eq!(across.len(), two.displacement.len());
+        // A reference alone leaves the second axis at rest.
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("wave.csv");
+        std::fs::write(
+            &path,
+            crate::iteration::drive_text(&made::wave("wave", 500)),
+        )
+        .unwrap();
+        let asked = Request {
+            reference: Some(path.clone()),
+            ..request()
+        };
+        let own = motions.find(&asked, &both).unwrap();
+        let across = own.across.unwrap();
+        assert!(own.displacement.len() >= 500 && across.displacement.iter().all(|x| *x == 0.0));
+        for (asked, option) in [
+            (
+                Request {
+                    record_y: Some("a.AT2".into()),
+                    ..request()
+                },
+                "--record-y",
+            ),
+            (
+                Request {
+                    reference_y: Some("a.csv".into()),
+                    ..request()
+                },
+                "--reference-y",
+            ),
+        ] {
+            let told = motions.find(&asked, &single).unwrap_err().to_string();
+            assert!(
+                told.contains(option) && told.contains("own.toml has a single axis"),
+                "{told}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_motion_is_made_once_and_scaled_for_each_request() {
+        let motions = Motions::default();
+        let single = file(&["reference.displacement -> a.u"], "sampling = \"4 ms\"");
+        let scaled = |factor| {
+            let asked = Request {
+                scaling: Some(motion::Scaling::Factor(factor)),
+                ..request()
+            };
+            motions.find(&asked, &single).unwrap()
+        };
+        let (one, twice) = (scaled(0.1), scaled(0.2));
+        assert_eq!(one.dt, 0.004);
+        assert!((twice.peak_acceleration() / one.peak_acceleration() - 2.0).abs() < 1e-9);
+        assert_eq!(motions.0.lock().unwrap().len(), 1);
+    }
+}

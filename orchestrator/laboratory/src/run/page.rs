@@ -279,3 +279,244 @@ pub fn page_again(folder: &Path, units: UnitSystem) -> Result<Report, Error> {
             .into(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made::{self, summary, write_files, write_run};
+    use crate::run::axes::{Axis, CrossMotion};
+    use crate::run::experiment::Request;
+    use crate::run::summary::{MotionSummary, Trip};
+    use fmi_master::{Change, Ending, RealTime, StepsTaken};
+    use pages::report::UnitSystem;
+
+    fn shown(report: &Report, units: UnitSystem) -> String {
+        let text = expected::text_of(report, units).replace(env!("CARGO_PKG_VERSION"), "VERSION");
+        // Checksums are those of an archive whose bytes are not fixed here.
+        let lines = text.lines().map(|line| match line.split_once("SHA-256 ") {
+            Some((before, after)) => format!("{before}SHA-256 SUM{}", &after[16..]),
+            None => line.to_string(),
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    }
+
+    fn words(text: &str) -> String {
+        format!("{text}\n======\n")
+    }
+
+    #[test]
+    fn a_run_is_reported_again_from_its_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let request = Request {
+            set: vec!["control.proportional_gain=5 V/in".into()],
+            ..Request::built_in("mpc")
+        };
+        let (mut summary, mut manifest) = write_run(folder.path(), &request, 0.9);
+        let page = page_again(folder.path(), UnitSystem::Us).unwrap();
+        let mut text = words(&shown(&page, UnitSystem::Us));
+        // Stopped, with changes, and steps that varied.
+        let motion = made::wave("wave", 2000);
+        let mut record = Record::with_capacity(made::followed(&motion, 0.9).columns, 0);
+        made::followed(&motion, 0.9)
+            .rows()
+            .take(900)
+            .for_each(|row| record.push(row[0], &row[1..], &[]));
+        summary.tracking = None;
+        summary.ended = Ending::Interlock;
+        summary.ended_because = Some("interlock: stroke".into());
+        summary.trip = Some(Trip {
+            time_s: 1.5,
+            cause: "the table left its stroke".into(),
+        });
+        summary.variable_step = Some(taken());
+        manifest.request.variable_step_percent = Some(0.1);
+        manifest.request.tuning = Some(crate::systems::tuning::Tuning::Printed);
+        manifest.changes = vec![change()];
+        write_files(folder.path(), &summary, &manifest, &record);
+        let page = page_again(folder.path(), UnitSystem::Si).unwrap();
+        text += &shown(&page, UnitSystem::Si);
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "run.txt", &text);
+    }
+
+    #[test]
+    fn a_run_without_a_table_or_reference_has_no_page() {
+        let folder = tempfile::tempdir().unwrap();
+        let (summary, mut manifest) = write_run(folder.path(), &Request::built_in("mpc"), 0.9);
+        let told = |record: &Record, manifest: &Manifest| {
+            write_files(folder.path(), &summary, manifest, record);
+            page_again(folder.path(), UnitSystem::Us)
+                .err()
+                .unwrap()
+                .to_string()
+        };
+        let bare = Record::of(vec!["time".into()], vec![0.0, 1.0], Vec::new(), Vec::new()).unwrap();
+        let no_reference = told(&bare, &manifest);
+        assert!(
+            no_reference.contains("there is no column `reference.displacement`"),
+            "{no_reference}"
+        );
+        manifest.components.remove("table");
+        let record = made::followed(&made::wave("wave", 20), 0.9);
+        let no_table = told(&record, &manifest);
+        assert!(
+            no_table.contains("no component of the run is a table"),
+            "{no_table}"
+        );
+        let place = folder.path().join("none");
+        assert!(
+            page_again(&place, UnitSystem::Us)
+                .unwrap_err()
+                .to_string()
+                .contains("manifest.json")
+        );
+    }
+
+    fn taken() -> StepsTaken {
+        StepsTaken {
+            tolerance_percent: 0.1,
+            least_s: 1e-5,
+            greatest_s: 0.002,
+            shortest_s: 0.000_25,
+            longest_s: 0.002,
+            repeated: 17,
+            over: 0,
+            worst_percent: 0.0876,
+            worst_signal: Some("table.force".into()),
+        }
+    }
+
+    fn change() -> Change {
+        Change {
+            variable: "control.proportional_gain".into(),
+            time_s: 0.5,
+            sample: 250,
+            samples: 500,
+            from: 196.85,
+            to: 393.7,
+        }
+    }
+
+    #[test]
+    fn figures_of_a_run_are_printed_as_tables() {
+        use crate::run::refinement::CouplingError;
+        use crate::run::text::text;
+        let motion = made::wave("wave", 2000);
+        let record = made::followed(&motion, 0.9);
+        let plain = summary(&motion, &record);
+        let mut all = vec![
+            text(&plain, &record, &motion, UnitSystem::Us),
+            text(&plain, &record, &motion, UnitSystem::Si),
+        ];
+        let mut more = plain.clone();
+        more.variable_step = Some(taken());
+        more.coupling_error = Some(CouplingError {
+            percent: 0.123_45,
+            signal: "table.force".into(),
+            wanted_percent: 0.5,
+            steps_s: vec![0.002],
+        });
+        more.real_time = Some(RealTime {
+            deadlines: 100,
+            missed: 3,
+            worst_s: 0.0123,
+            jitter_median_s: 5e-6,
+            jitter_p99_s: 45e-6,
+        });
+        more.tracking = None;
+        all.push(text(&more, &record, &motion, UnitSystem::Si));
+        // Two axes, of which the second rests.
+        let still = motion.at_rest();
+        let both = motion.clone().along_two_axes(still);
+        let axis = |name: &str, tracking, at_rest| Axis {
+            axis: name.into(),
+            motion: MotionSummary::of(&motion),
+            tracking,
+            at_rest,
+        };
+        let cross = CrossMotion {
+            displacement_percent: 1.25,
+            acceleration_percent: 2.5,
+            peak_displacement_m: 0.001,
+            peak_acceleration_m_s2: 0.5,
+        };
+        let mut biaxial = plain.clone();
+        biaxial.axes = vec![
+            axis("x", plain.tracking, None),
+            axis("y", None, Some(cross)),
+        ];
+        all.push(text(&biaxial, &record, &both, UnitSystem::Us));
+        let none = Motion {
+            displacement: Vec::new(),
+            velocity: Vec::new(),
+            acceleration: Vec::new(),
+            ..motion.clone()
+        };
+        let mut bare = plain;
+        bare.tracking = None;
+        bare.variable_step = Some(StepsTaken {
+            shortest_s: 0.002,
+            worst_signal: None,
+            ..taken()
+        });
+        all.push(text(&bare, &record, &none, UnitSystem::Us));
+        expected::compare(
+            env!("CARGO_MANIFEST_DIR"),
+            "run-figures.txt",
+            &all.join("\n======\n"),
+        );
+    }
+
+    #[test]
+    fn a_run_is_measured_and_its_files_are_written() {
+        let motion = made::wave("wave", 2000);
+        let prepared = made::prepared(motion.clone(), made::follows);
+        let outcome = prepared.run(prepared.algorithm).unwrap();
+        assert_eq!(
+            (outcome.ended.kind(), outcome.record.len()),
+            (Ending::Complete, motion.len())
+        );
+        let how = (prepared.algorithm, prepared.step, prepared.samples);
+        let request = Request::built_in("mpc");
+        let mut manifest = Manifest::new(&request, &prepared.system, &motion, how);
+        let summary = Summary::new(&prepared, &outcome, &manifest);
+        let tracking = summary.tracking.unwrap();
+        // A tenth of the motion is missing, and a step passes until the table moves.
+        let missing = 1.0 - tracking.peak_acceleration / motion.peak_acceleration();
+        assert!((missing - 0.1).abs() < 1e-6, "{missing}");
+        assert!(
+            tracking.delay > 0.0 && tracking.delay < 0.005,
+            "{}",
+            tracking.delay
+        );
+        assert_eq!(
+            (&*summary.system, &*summary.fmi, summary.steps),
+            ("rig", "3.0", outcome.steps)
+        );
+        assert!(
+            summary.trip.is_none() && summary.warnings.is_empty(),
+            "{:?}",
+            summary.warnings
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::new(folder.path().join("out"));
+        let written = write(&out, &prepared, &outcome, &summary, &mut manifest, true).unwrap();
+        assert_eq!(written.len(), 6);
+        let bytes = std::fs::read(out.join(RESULTS)).unwrap();
+        assert_eq!(manifest.results_sha256, fmi_import::digest(&bytes));
+        let again = Manifest::read(&out.join("manifest.json")).unwrap();
+        assert!(manifest.differences(&again).is_empty());
+        let page = page_again(&out, UnitSystem::Us).unwrap();
+        assert_eq!(page.title, "rig on wave");
+    }
+
+    #[test]
+    fn a_table_that_does_not_follow_at_all_has_failed() {
+        fn runs_away(inputs: &[f64], outputs: &mut [f64]) {
+            made::follows(inputs, outputs);
+            outputs[0] *= -9.0;
+        }
+        let prepared = made::prepared(made::wave("wave", 500), runs_away);
+        let outcome = prepared.run(prepared.algorithm).unwrap();
+        assert_eq!(outcome.ended.kind(), Ending::Failed, "{:?}", outcome.ended);
+    }
+}

@@ -128,3 +128,46 @@ fn estimate(
     });
     errors.max_by(|one, other| one.0.total_cmp(&other.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(columns: &[&str], rows: &[&[f64]]) -> Record {
+        let columns = columns.iter().map(ToString::to_string).collect();
+        Record::of(columns, rows.concat(), Vec::new(), Vec::new()).unwrap()
+    }
+
+    /// The difference over the peak, and over 2^p - 1 of it with order p.
+    #[test]
+    fn the_error_of_the_coupling_is_that_of_the_signal_with_the_largest() {
+        let columns = ["time", "a.x", "b.y", "c.rest"];
+        let coarse = record(&columns, &[&[0.0, 1.0, 9.0, 0.0], &[0.1, -2.2, 10.0, 0.5]]);
+        let fine = record(&columns, &[&[0.0, 1.1, 9.0, 0.0], &[0.1, -2.0, 9.5, 0.0]]);
+        let names = ["a.x", "b.y", "c.rest", "not.there"].map(String::from);
+        for (order, part) in [(1, 1.0), (2, 3.0)] {
+            let (percent, signal) = estimate(&names, &coarse, &fine, order).unwrap();
+            assert_eq!(signal, "a.x");
+            assert!((percent - 10.0 / part).abs() < 1e-9, "{percent}");
+        }
+        let (percent, _) = estimate(&names[1..], &coarse, &fine, 1).unwrap();
+        assert!((percent - 100.0 * 0.5 / 9.5).abs() < 1e-9, "{percent}");
+        // A signal that rests in the finer record has no error.
+        assert_eq!(estimate(&names[2..], &coarse, &fine, 1).unwrap().0, 0.0);
+        assert!(estimate(&names[3..], &coarse, &fine, 1).is_none());
+    }
+
+    #[test]
+    fn an_error_is_reached_at_what_was_asked_for() {
+        let own = |percent| CouplingError {
+            percent,
+            signal: "a.x".into(),
+            wanted_percent: 0.5,
+            steps_s: vec![0.002, 0.001],
+        };
+        assert_eq!(
+            [0.4, 0.5, 0.51].map(|percent| own(percent).is_reached()),
+            [true, true, false]
+        );
+    }
+}

@@ -235,4 +235,63 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn columns_have_the_units_and_descriptions_of_their_variables() {
+        use crate::made;
+        let names = [
+            "time",
+            "reference.displacement",
+            "reference.velocity_y",
+            "reference.acceleration[3]",
+            "specimen.drift",
+            "specimen.other",
+            "none.x",
+        ];
+        let record = Record::with_capacity(names.map(String::from).to_vec(), 0)
+            .beside(&["specimen.text".into()]);
+        let columns = columns(&made::rig(), &record);
+        let mut text = Vec::new();
+        write_columns(&columns, &mut text).unwrap();
+        assert_eq!(
+            String::from_utf8(text).unwrap(),
+            "column,unit,description\ntime,s,time\nreference.displacement,m,displacement asked for\n\
+             reference.velocity_y,m/s,velocity asked for along y\nspecimen.drift,m,about drift\nspecimen.other,,\n\
+             none.x,,\nspecimen.text,,\n"
+        );
+    }
+
+    #[test]
+    fn what_lies_ahead_of_the_reference_is_not_written_and_a_record_reads_back() {
+        let names = ["time", "reference.x[1]", "a.x"].map(String::from).to_vec();
+        let record = Record::of(
+            names,
+            vec![0.0, 9.0, 1.5, 0.5, 9.0, -0.1],
+            Vec::new(),
+            Vec::new(),
+        )
+        .unwrap();
+        let mut text = Vec::new();
+        write_csv(&record, &mut text).unwrap();
+        assert_eq!(
+            String::from_utf8_lossy(&text),
+            "time,a.x\n0.0,1.5\n0.5,-0.1\n"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(RESULTS);
+        let told = |text: &[u8]| {
+            std::fs::write(&path, text).unwrap();
+            read_csv(&path).map_err(|error| error.to_string())
+        };
+        let read = told(&text).unwrap();
+        assert_eq!(
+            (read.columns.len(), read.column("a.x").unwrap()),
+            (2, vec![1.5, -0.1])
+        );
+        let wrong = told(b"time,a\n0,1\n1,b\n").unwrap_err();
+        assert!(wrong.contains("line 3: `b` is not a number"), "{wrong}");
+        let wrong = told(b"t,a\n0,1\n").unwrap_err();
+        assert!(wrong.contains("the first column is not `time`"), "{wrong}");
+        assert!(told(b"time,a\n0\n").is_err());
+    }
 }

@@ -240,3 +240,63 @@ pub fn asked(record: &Record, motion: &Motion) -> Option<Motion> {
         ..motion.clone()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+
+    #[test]
+    fn a_table_is_asked_for_what_a_structure_computes_where_there_is_one() {
+        let motion = made::wave("wave", 3);
+        let columns = [
+            "time",
+            "structure.table_displacement",
+            "structure.table_velocity",
+            "structure.table_acceleration",
+        ];
+        let columns = columns.map(String::from).to_vec();
+        let record = Record::of(
+            columns.clone(),
+            vec![0.0, 1.0, 2.0, 3.0, 0.5, 4.0, 5.0, 6.0],
+            Vec::new(),
+            Vec::new(),
+        );
+        let own = asked(&record.unwrap(), &motion).unwrap();
+        assert_eq!(own.name, "wave through `structure`");
+        assert_eq!(
+            (own.displacement, own.velocity, own.acceleration),
+            (vec![1.0, 4.0], vec![2.0, 5.0], vec![3.0, 6.0])
+        );
+        assert!(asked(&Record::with_capacity(columns[..3].to_vec(), 0), &motion).is_none());
+        assert!(asked(&made::followed(&motion, 1.0), &motion).is_none());
+    }
+
+    #[test]
+    fn a_trip_is_what_stopped_a_run() {
+        let trip = |ended: &Ended| Trip::of(ended).map(|own| (own.time_s, own.cause));
+        let interlock = |cause: Option<&str>| Ended::Interlock {
+            signal: "interlock.tripped".into(),
+            time: 1.5,
+            cause: cause.map(str::to_string),
+        };
+        assert_eq!(
+            trip(&interlock(Some("stroke"))),
+            Some((1.5, "stroke".into()))
+        );
+        assert_eq!(
+            trip(&interlock(None)),
+            Some((1.5, "interlock.tripped".into()))
+        );
+        assert_eq!(trip(&Ended::Complete), None);
+        assert_eq!(trip(&Ended::Interrupted { time: 2.0 }), None);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("summary.json");
+        std::fs::write(&path, "{}").unwrap();
+        let told = Summary::read(&path).unwrap_err().to_string();
+        assert!(
+            told.contains("summary.json") && told.contains("not the summary of a run"),
+            "{told}"
+        );
+    }
+}

@@ -124,3 +124,78 @@ fn follows_second(name: &str, connections: &[Link]) -> bool {
     }
     false
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn links(texts: &[&str]) -> Vec<Link> {
+        let texts = texts
+            .iter()
+            .map(|text| Link::try_from((*text).to_string()).unwrap());
+        texts.collect()
+    }
+
+    fn record(tables: &[&str]) -> Record {
+        let columns = tables.iter().flat_map(|name| {
+            let outputs = ["displacement", "velocity", "acceleration"];
+            outputs.map(|output| format!("{name}.{output}"))
+        });
+        Record::with_capacity(
+            std::iter::once("time".to_string()).chain(columns).collect(),
+            0,
+        )
+    }
+
+    #[test]
+    fn the_table_is_called_so_or_moves_by_a_valve_command() {
+        let own = links(&[
+            "reference.displacement -> control.reference_displacement",
+            "control.valve_command -> interlock.controller_command",
+            "interlock.valve_command -> rig.valve_command",
+            "control.valve_command -> other.valve_command",
+        ]);
+        let names = ["control", "interlock", "other", "rig"];
+        let among = |names: &[&'static str], record: &Record| {
+            let found = Table::among(names.iter().copied(), &own, record)?;
+            Some((found.name("displacement"), found.valve))
+        };
+        let commands = ["control.valve_command", "interlock.valve_command"]
+            .map(String::from)
+            .to_vec();
+        // Back from the valve to the controller.
+        let found = among(&names, &record(&["rig"]));
+        assert_eq!(found, Some(("rig.displacement".to_string(), commands)));
+        let both = among(&names, &record(&["other", "rig"])).unwrap();
+        assert_eq!(both.0, "other.displacement");
+        // What is called so is the table, even if nothing drives it.
+        let named = among(&["other", "table"], &record(&["other"])).unwrap();
+        assert_eq!(named, ("table.displacement".to_string(), Vec::new()));
+        // A component whose motion is not recorded is none, nor one without a valve.
+        assert_eq!(among(&names, &record(&["control"])), None);
+        let thinned = Record::with_capacity(vec!["time".into(), "rig.displacement".into()], 0);
+        assert_eq!(among(&names, &thinned), None);
+    }
+
+    #[test]
+    fn the_second_table_follows_the_reference_of_the_second_axis() {
+        let own = links(&[
+            "reference.displacement -> control.reference_displacement",
+            "control.valve_command -> table.valve_command",
+            "reference.displacement_y -> control_y.reference_displacement",
+            "control_y.valve_command -> table_y.valve_command",
+            "table.force -> table_y.force",
+        ]);
+        let names = ["control", "control_y", "table", "table_y"];
+        let recorded = record(&["table", "table_y"]);
+        let second = |links: &[Link]| {
+            let found = Table::second(names.into_iter(), links, &recorded);
+            found.map(|own| own.name("x"))
+        };
+        assert_eq!(second(&own).as_deref(), Some("table_y.x"));
+        // A controller of both axes is not that of the second.
+        let mixed = links(&["reference.displacement -> control_y.other"]);
+        assert_eq!(second(&[&own[..], &mixed].concat()), None);
+        assert_eq!(second(&own[..2]), None);
+    }
+}

@@ -219,3 +219,139 @@ pub fn in_words(change: &Change, unit: &str, system: UnitSystem) -> String {
         change.time_s
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+    use fmi_system::Value;
+
+    fn bench() -> System {
+        let tunable = |n, name: &str, more: &str| {
+            made::real(
+                n,
+                name,
+                "parameter",
+                &format!(r#"variability="tunable" {more}"#),
+            )
+        };
+        let variables = tunable(1, "gain", r#"start="2" unit="V/m" min="0.5" max="100""#)
+            + &tunable(2, "zero", r#"start="0""#)
+            + &tunable(3, "below", r#"start="-4""#)
+            + &tunable(4, "narrow", r#"start="8" min="7""#)
+            + &made::real(5, "fixed", "parameter", r#"variability="fixed" start="1""#);
+        let mut control = made::component("control", &variables);
+        let narrow = control.fmu.description.position("narrow").unwrap();
+        control.parameters.push((narrow, Value::Number(10.0)));
+        made::system(vec![control])
+    }
+
+    fn found(wanted: &[&str]) -> Result<Vec<(String, [f64; 3])>, String> {
+        let wanted: Vec<String> = wanted.iter().map(ToString::to_string).collect();
+        let panel = panel(&bench(), &wanted, 0.002).map_err(|error| error.to_string())?;
+        let all = panel.tunables().iter();
+        Ok(all
+            .map(|own| (own.variable.clone(), [own.start, own.low, own.high]))
+            .collect())
+    }
+
+    #[test]
+    fn parameters_may_change_between_half_and_twice_their_value_or_stated_bounds() {
+        let own = |name: &str, three: [f64; 3]| (format!("control.{name}"), three);
+        assert_eq!(
+            found(&["control.gain"]),
+            Ok(vec![own("gain", [2.0, 1.0, 4.0])])
+        );
+        assert_eq!(
+            found(&["control.below"]),
+            Ok(vec![own("below", [-4.0, -8.0, -2.0])])
+        );
+        // The value that is set counts, and what the FMU accepts.
+        assert_eq!(
+            found(&["control.narrow"]),
+            Ok(vec![own("narrow", [10.0, 7.0, 20.0])])
+        );
+        assert_eq!(
+            found(&["control.gain=\u{31} V/m..3 V/m"]),
+            Ok(vec![own("gain", [2.0, 1.0, 3.0])])
+        );
+        assert_eq!(
+            found(&["control.zero=-1..1"]),
+            Ok(vec![own("zero", [0.0, -1.0, 1.0])])
+        );
+        // All but what is zero; stated bounds replace the usual ones and come last.
+        assert_eq!(
+            found(&["control.gain=0.5 V/m..2 V/m", "all"]),
+            Ok(vec![
+                own("below", [-4.0, -8.0, -2.0]),
+                own("narrow", [10.0, 7.0, 20.0]),
+                own("gain", [2.0, 0.5, 2.0]),
+            ])
+        );
+    }
+
+    #[test]
+    fn bounds_and_names_at_fault_are_refused_with_what_is_expected() {
+        for (wanted, expected) in [
+            ("control.gian", "the system has no parameter `control.gian`"),
+            (
+                "control.fixed",
+                "`control.fixed` is not a tunable parameter",
+            ),
+            ("control.zero", "expected control.zero=LOW..HIGH"),
+            (
+                "control.gain=3",
+                "`3` is not a range; expected control.gain=\"LOW V/m..HIGH V/m\"",
+            ),
+            ("control.gain=1..3 V/m", "`1` has no unit"),
+            ("control.gain=1 kg..3 V/m", "`1 kg`"),
+            ("control.gain=3 V/m..1 V/m", "holds no values"),
+            (
+                "control.gain=1 V/m..200 V/m",
+                "beyond what the FMU accepts for `control.gain`, 0.5 to 100 V/m",
+            ),
+            (
+                "control.gain=3 V/m..5 V/m",
+                "is 2 at the beginning, which is outside of 3 to 5 V/m",
+            ),
+        ] {
+            let told = found(&[wanted]).unwrap_err();
+            assert!(told.contains(expected), "{wanted}: {told}");
+        }
+        let told = found(&["control.gian"]).unwrap_err();
+        assert!(
+            told.ends_with("tunable are control.gain, control.zero, control.below, control.narrow"),
+            "{told}"
+        );
+        let told = found(&[]).unwrap_err();
+        assert!(
+            told.contains("no tunable parameter whose value is not 0"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn a_change_is_told_in_the_units_of_its_reader() {
+        let change = Change {
+            variable: "control.gain".into(),
+            time_s: 1.25,
+            sample: 0,
+            samples: 500,
+            from: 100.0,
+            to: 200.0,
+        };
+        let words = |unit: &str, system| in_words(&change, unit, system);
+        assert_eq!(
+            words("V/m", UnitSystem::Us),
+            "`control.gain` from 2.540 to 5.080 V/in at 1.250 s"
+        );
+        assert_eq!(
+            words("V/m", UnitSystem::Si),
+            "`control.gain` from 0.1000 to 0.2000 V/mm at 1.250 s"
+        );
+        assert_eq!(
+            words("", UnitSystem::Si),
+            "`control.gain` from 100.0 to 200.0 at 1.250 s"
+        );
+    }
+}

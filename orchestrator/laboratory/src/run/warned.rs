@@ -56,3 +56,57 @@ pub(super) fn warned(system: &System, outcome: &Outcome) -> Vec<String> {
     }
     sentences
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+    use fmi_master::{Ended, Record};
+
+    #[test]
+    fn each_warning_is_told_with_its_first_time_and_samples() {
+        let word = r#"<Enumeration name="warning" declaredType="Word" valueReference="1" causality="output"
+            variability="discrete"/>"#;
+        let real = made::real(1, "warning", "output", "");
+        let system = made::system(vec![
+            made::component("interlock", word),
+            made::component("other", &real),
+            made::component("silent", word),
+        ]);
+        let columns = ["time", "interlock.warning", "other.warning"]
+            .map(String::from)
+            .to_vec();
+        let rows = [0.0, 5.0, 2.0, 5.0, 9.0, 2.0];
+        let outcome = |ended: Ended| {
+            let mut record = Record::with_capacity(columns.clone(), rows.len());
+            for (n, value) in rows.iter().enumerate() {
+                record.push(0.25 * n as f64, &[*value, 1.0], &[]);
+            }
+            fmi_master::Outcome {
+                record,
+                ended,
+                steps: rows.len(),
+                step: 0.25,
+                simulated: 1.0,
+                variable: None,
+                wall: 1.0,
+                spent: Vec::new(),
+                messages: Vec::new(),
+                notes: Vec::new(),
+                real_time: None,
+                changes: Vec::new(),
+            }
+        };
+        assert_eq!(
+            warned(&system, &outcome(Ended::Complete)),
+            [
+                "`interlock` warned at 0.250 s (2 samples): far",
+                "`interlock` warned at 0.500 s (2 samples): near a limit",
+                "`interlock` warned at 1.000 s (1 sample): warning 9",
+            ]
+        );
+        // What was warned of when the run was stopped is its end.
+        let stopped = warned(&system, &outcome(Ended::Interrupted { time: 0.5 }));
+        assert_eq!(stopped, ["`interlock` warned at 0.250 s (1 sample): far"]);
+    }
+}

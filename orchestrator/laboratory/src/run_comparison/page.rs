@@ -227,3 +227,76 @@ fn differences(comparison: &RunComparison) -> Section {
         ..Section::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made::write_run;
+    use crate::results::Out;
+    use crate::run::experiment::Request;
+    use crate::run_comparison::{find, read};
+    use pages::report::UnitSystem;
+    use pages::report::columns::aligned;
+
+    #[test]
+    fn runs_in_folders_are_compared_with_what_differs() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        let request = Request::built_in("mpc");
+        let other = Request {
+            specimen: "none".into(),
+            system: "three-variable".into(),
+            ..request.clone()
+        };
+        write_run(&place("runs/first"), &request, 0.9);
+        write_run(&place("runs/second"), &other, 0.75);
+        std::fs::create_dir_all(place("runs/empty")).unwrap();
+        let found = find(&[place("runs")]).unwrap();
+        assert_eq!(found, [place("runs/first"), place("runs/second")]);
+        let comparison = read(&found, UnitSystem::Us).unwrap();
+        let page = report(&comparison);
+        let text = expected::text_of(&page, UnitSystem::Us)
+            + &aligned(&comparison.figures(UnitSystem::Si));
+        let text = text.replace(&folder.path().display().to_string(), "FOLDER");
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "run-comparison.txt", &text);
+        let out = Out::new(place("out"));
+        assert_eq!(comparison.write(&out).unwrap().len(), 3);
+        let csv = std::fs::read_to_string(out.join("runs.csv")).unwrap();
+        let lines: Vec<&str> = csv.lines().collect();
+        assert_eq!(lines.len(), 3);
+        assert!(lines[1].starts_with("first,mpc,wave,complete,"), "{csv}");
+        // Two folders of one name are told apart by their paths.
+        write_run(&place("again/first"), &request, 0.9);
+        let twice = read(&[place("runs/first"), place("again/first")], UnitSystem::Us).unwrap();
+        assert_eq!(
+            twice.runs[1].label,
+            place("again/first").display().to_string()
+        );
+        assert!(twice.differences.is_empty());
+        assert!(summary(&twice).ends_with("Their manifests are identical."));
+    }
+
+    #[test]
+    fn folders_without_two_runs_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        write_run(&place("one"), &Request::built_in("mpc"), 0.9);
+        let told = |name: &str| {
+            read(&[place(name)], UnitSystem::Us)
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(
+            told("one").contains("this is one run; expected two or more"),
+            "{}",
+            told("one")
+        );
+        assert!(told("none").contains("is not a folder"), "{}", told("none"));
+        std::fs::create_dir(place("empty")).unwrap();
+        assert!(
+            told("empty").contains("contains no run"),
+            "{}",
+            told("empty")
+        );
+    }
+}
