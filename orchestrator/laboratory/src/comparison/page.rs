@@ -211,3 +211,129 @@ fn panels(rows: &[Row]) -> Vec<Panel> {
         }),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comparison::result::AlongY;
+    use fmi_master::Ending;
+    use pages::report::UnitSystem;
+
+    fn row(record: &str, controller: &str, percent: f64) -> Row {
+        Row {
+            record: record.into(),
+            controller: controller.into(),
+            time_domain_percent: Some(percent),
+            frequency_domain_percent: Some(0.1 * percent),
+            response_spectrum_percent: Some(2.0 * percent),
+            significant_duration_percent: Some(1.5 * percent),
+            peak_displacement_m: Some(0.05),
+            along_y: None,
+            ended: Ending::Complete,
+            ended_because: None,
+            ended_s: None,
+            history: None,
+        }
+    }
+
+    fn history(error: &[f64]) -> Option<History> {
+        Some(History {
+            dt: 0.002,
+            displacement_error: error.iter().map(|own| 0.01 * own).collect(),
+            acceleration_error: error.to_vec(),
+        })
+    }
+
+    /// Two controllers on a record of the thesis and another one; one run was stopped, one failed.
+    fn comparison() -> Comparison {
+        let mut rows = vec![
+            row("RSN495_NAHANNI_S1280", "mpc", 2.0),
+            row("other", "mpc", 3.0),
+            row("third", "mpc", 4.5),
+            row("RSN495_NAHANNI_S1280", "own", 7.0),
+            row("other", "own", 9.0),
+            row("third", "own", 1.0),
+        ];
+        rows[0].history = history(&[0.5, -1.5, 1.0]);
+        rows[3].history = history(&[0.25, 2.0]);
+        rows[4].ended = Ending::Interlock;
+        rows[4].ended_s = Some(3.25);
+        rows[4].ended_because = Some("the table left its reference".into());
+        rows[5].ended = Ending::Failed;
+        rows[5].time_domain_percent = None;
+        Comparison::new("identified", "linear", rows)
+    }
+
+    /// The same on a table with two axes, of which the second rested once.
+    fn biaxial() -> Comparison {
+        let along = |percent: Option<f64>, at_rest: Option<f64>| {
+            Some(AlongY {
+                time_domain_percent: percent,
+                frequency_domain_percent: percent.map(|own| 0.2 * own),
+                response_spectrum_percent: percent.map(|own| 3.0 * own),
+                significant_duration_percent: None,
+                at_rest_percent: at_rest,
+            })
+        };
+        let mut rows = vec![
+            row("one", "mpc", 2.0),
+            row("two", "mpc", 3.0),
+            row("one", "lqg", 1.0),
+        ];
+        rows[0].along_y = along(Some(4.0), None);
+        rows[1].along_y = along(None, Some(0.75));
+        rows[2].along_y = along(Some(5.0), None);
+        rows[0].history = history(&[1.0, 2.0]);
+        Comparison::new("biaxial", "none", rows)
+    }
+
+    fn shown(comparison: &Comparison) -> String {
+        expected::text_of(&page(comparison), UnitSystem::Si)
+            .replace(env!("CARGO_PKG_VERSION"), "VERSION")
+    }
+
+    #[test]
+    fn a_comparison_has_tables_beside_the_printed_values_and_plots() {
+        let all = [comparison(), biaxial()];
+        let tables = all.iter().flat_map(tables);
+        let mut text: Vec<String> = tables.map(|own| own.text()).collect();
+        text.extend(all.iter().map(shown));
+        let medians = all.iter().map(|own| format!("{:#?}", own.medians));
+        text.extend(medians);
+        expected::compare(
+            env!("CARGO_MANIFEST_DIR"),
+            "comparison.txt",
+            &text.join("\n======\n"),
+        );
+    }
+
+    #[test]
+    fn the_page_is_made_again_from_the_files_of_a_comparison() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::new(folder.path().join("out"));
+        let own = comparison();
+        let written = write(&own, &out).unwrap();
+        assert_eq!(written.len(), 3);
+        let again = page_again(&out).unwrap();
+        let again =
+            expected::text_of(&again, UnitSystem::Si).replace(env!("CARGO_PKG_VERSION"), "VERSION");
+        assert_eq!(again, shown(&own));
+        // Without errors over time there are no plots.
+        std::fs::remove_file(out.join(errors::FILE)).unwrap();
+        assert!(page_again(&out).unwrap().sections[0].panels.is_empty());
+        std::fs::write(out.join(COMPARISON), "[]").unwrap();
+        let told = page_again(&out).unwrap_err().to_string();
+        assert!(told.contains("not the JSON of a comparison"), "{told}");
+    }
+
+    #[test]
+    fn errors_over_time_leave_cells_empty_behind_an_early_end() {
+        let own = comparison();
+        assert_eq!(
+            errors::written(&own.rows),
+            "time,mpc.displacement_error,mpc.acceleration_error,own.displacement_error,own.acceleration_error\n\
+             0,0.005,0.5,0.0025,0.25\n0.002,-0.015,-1.5,0.02,2\n0.004,0.01,1,,\n"
+        );
+        assert_eq!(errors::written(&[]), "time\n");
+    }
+}

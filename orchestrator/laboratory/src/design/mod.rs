@@ -208,3 +208,71 @@ impl From<&WholePlantDesign> for Synthesis {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn specimens_and_loops_are_read_by_their_names() {
+        for specimen in [Specimen::None, Specimen::Linear] {
+            assert_eq!(specimen.name().parse(), Ok(specimen));
+        }
+        let refused = "yielding".parse::<Specimen>().unwrap_err().to_string();
+        assert_eq!(
+            refused,
+            "`yielding` has no linear model; expected none or linear"
+        );
+        for name in LoopName::ALL {
+            assert_eq!(name.name().parse(), Ok(name));
+            assert_eq!(name.to_string(), name.name());
+        }
+        let refused = "pid".parse::<LoopName>().unwrap_err().to_string();
+        assert!(
+            refused
+                .starts_with("`pid` is not a loop; expected one of displacement-pid, force-pid, "),
+            "{refused}"
+        );
+        let mut about = LoopName::ALL.map(LoopName::about).to_vec();
+        about.sort_unstable();
+        about.dedup();
+        assert_eq!(about.len(), LoopName::ALL.len());
+    }
+
+    #[test]
+    fn loops_of_the_thesis_have_their_margins_and_pages() {
+        use pages::report::columns::aligned;
+        let mut text = String::new();
+        for specimen in [Specimen::None, Specimen::Linear] {
+            let found = design(&Options {
+                specimen,
+                ..Options::default()
+            })
+            .unwrap();
+            text += &aligned(&table(&found.loops));
+            for own in &found.loops {
+                text += &format!("{}: {}\n", own.name, own.note);
+            }
+            text += &page::text_of(&found).replace(env!("CARGO_PKG_VERSION"), "VERSION");
+        }
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "design.txt", &text);
+    }
+
+    #[test]
+    fn one_loop_is_designed_alone_and_for_a_crossover() {
+        let found = design(&Options {
+            only: Some(LoopName::LoopShapingSynthesis),
+            crossover: Some(60.0),
+            specimen: Specimen::None,
+        })
+        .unwrap();
+        assert_eq!(found.loops.len(), 1);
+        let own = &found.loops[0];
+        assert_eq!(own.name, LoopName::LoopShapingSynthesis);
+        let reached = found.synthesis.reached_crossover_rad_s.unwrap();
+        assert!((reached / 60.0 - 1.0).abs() < 0.02, "{reached}");
+        let crossover = own.sampled.crossover_rad_s.unwrap();
+        assert!((crossover / reached - 1.0).abs() < 0.02, "{crossover}");
+        assert!(found.synthesis.gamma.is_none() && found.synthesis.gamma_min > 1.0);
+    }
+}

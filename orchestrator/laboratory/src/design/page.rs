@@ -224,3 +224,11 @@ fn shaping(design: &LoopShapingDesign) -> Section {
         ..Section::default()
     }
 }
+
+#[cfg(test)]
+pub(super) fn text_of(design: &Design) -> String {
+    let numbers = thesis_figures(design);
+    let numbers: Vec<&str> = numbers.iter().map(|own| own.number).collect();
+    let page = expected::text_of(&report(design), pages::report::UnitSystem::Si);
+    format!("figures {}\n{page}\n", numbers.join(", "))
+}

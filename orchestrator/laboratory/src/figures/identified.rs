@@ -246,3 +246,30 @@ fn recording(rig: &Run) -> String {
     }
     text + "\n"
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Velocity and acceleration against central differences.
+    #[test]
+    fn the_excitation_is_faded_in_with_its_own_derivatives() {
+        let dt = 0.0005;
+        let own = excitation(dt);
+        assert_eq!(own.len(), (LENGTH / dt) as usize);
+        assert!((own.peak_displacement() - PEAK).abs() < 1e-12);
+        assert_eq!((own.displacement[0], own.velocity[0]), (0.0, 0.0));
+        let slope = |values: &[f64], n: usize| (values[n + 1] - values[n - 1]) / (2.0 * dt);
+        let (v, a) = (own.peak_velocity(), own.peak_acceleration());
+        for n in [200, 1000, 2000, 4000, 50_000] {
+            assert!(
+                (slope(&own.displacement, n) - own.velocity[n]).abs() < 2e-3 * v,
+                "{n}"
+            );
+            assert!(
+                (slope(&own.velocity, n) - own.acceleration[n]).abs() < 4e-3 * a,
+                "{n}"
+            );
+        }
+    }
+}

@@ -125,3 +125,63 @@ pub fn write(figures: &[Figure], motion: &str, folder: &Out) -> Result<Vec<PathB
     }
     Ok(results.finish()?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pages::report::{Axis, Series, Units};
+
+    #[test]
+    fn figures_are_of_loops_or_of_runs() {
+        let (loops, runs): (Vec<_>, Vec<_>) = (of_loops().collect(), of_runs().collect());
+        assert_eq!(runs, ["3-6", "4-4", "4-6", "5-5", "5-6"]);
+        assert_eq!(loops.len() + runs.len(), NUMBERS.len());
+        assert!(loops.contains(&"2-6") && loops.contains(&"3-10"));
+    }
+
+    #[test]
+    fn figures_of_loops_are_drawn_without_a_run() {
+        let asked = std::cell::RefCell::new(Vec::new());
+        let draw = |numbers: &[&str]| {
+            let numbers: Vec<String> = numbers.iter().map(ToString::to_string).collect();
+            let tell = |number: &str| asked.borrow_mut().push(number.to_string());
+            figures(&numbers, None, &Installation::default(), &tell)
+        };
+        let found = draw(&["3-9", "3-3"]).unwrap();
+        assert_eq!(asked.take(), ["3-3 to 3-10"]);
+        let numbers: Vec<&str> = found.iter().map(|own| own.number).collect();
+        assert_eq!(numbers, ["3-3", "3-9"]);
+        let told = draw(&["3-3", "9-9"]).unwrap_err().to_string();
+        assert!(
+            told.contains("there is no figure `9-9`; expected some of 2-6, 2-7"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn each_plot_of_a_figure_is_a_picture() {
+        let panel = || Panel {
+            title: "loop".into(),
+            x: Axis::linear("time", Units::TIME),
+            y: Axis::linear("x", Units::NONE),
+            series: vec![Series::history("a", 1.0, &[0.0, 1.0])],
+        };
+        let figure = Figure {
+            number: "3-3",
+            text: "The loop.".into(),
+            panels: vec![panel(), panel()],
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let written = write(&[figure], "wave", &Out::new(folder.path().join("out"))).unwrap();
+        let names: Vec<_> = written
+            .iter()
+            .filter_map(|path| path.file_name()?.to_str())
+            .collect();
+        assert_eq!(
+            names,
+            ["report.html", "figure-3-3-1.svg", "figure-3-3-2.svg"]
+        );
+        let page = std::fs::read_to_string(&written[0]).unwrap();
+        assert!(page.contains("1 figures of Lin (2017) as computed by this program, on wave"));
+    }
+}

@@ -210,3 +210,23 @@ fn figure_5_6(record: Option<&Path>, installation: &Installation) -> Result<Figu
     let text = "The same with the linear specimen of Appendix A (100 lbf, 1 s, 5 %).";
     predictive("5-6", "linear", text, record, installation)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+
+    #[test]
+    fn two_tables_are_drawn_over_their_reference() {
+        let motion = made::wave("wave", 2000);
+        let run = |part| Run {
+            record: made::followed(&motion, part),
+            motion: motion.clone(),
+        };
+        let (one, other) = (run(0.9), run(0.5));
+        let panels = two([("PID", &one), ("three-variable", &other)]);
+        let text: String = panels.iter().map(expected::plot).collect();
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "figure.txt", &text);
+        assert!(one.column("none").is_empty());
+    }
+}

@@ -58,3 +58,49 @@ pub(super) fn table(summary: &Summary) -> Table {
         rows,
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poles_have_frequency_and_damping() {
+        let summary = Summary {
+            model: "model.toml".into(),
+            actuator_poles_rad_s: vec![[-30.0, 40.0], [-30.0, -40.0]],
+            table_poles_rad_s: vec![[-TAU, 0.0]],
+            fit_percent: Default::default(),
+            identifiable: true,
+            warnings: Vec::new(),
+            wall_s: 0.0,
+        };
+        let shown = |summary: &Summary| {
+            let table = table(summary);
+            expected::table(&table, pages::report::UnitSystem::Si)
+        };
+        assert_eq!(
+            shown(&summary),
+            "table: Poles\n\
+             of        real part [1/s]  imaginary part [1/s]  natural frequency     in Hz  damping ratio\n\
+             actuator          -30.000                40.000        50.00 rad/s  7.958 Hz          0.600\n\
+             actuator          -30.000               -40.000        50.00 rad/s  7.958 Hz          0.600\n\
+             table             -6.2832                     0        6.283 rad/s  1.000 Hz           1.00\n"
+        );
+        let drawn = panel(&summary);
+        assert_eq!(drawn.series.len(), 2);
+        let own = &drawn.series[0];
+        assert_eq!(
+            (&*own.name, &own.values[..]),
+            ("actuator", &[40.0, -40.0][..])
+        );
+        let Abscissa::At(places) = &own.abscissa else {
+            panic!("places expected")
+        };
+        assert_eq!(places[..], [-30.0, -30.0]);
+        let table_alone = Summary {
+            actuator_poles_rad_s: Vec::new(),
+            ..summary
+        };
+        assert_eq!(panel(&table_alone).series[0].name, "table");
+    }
+}

@@ -199,3 +199,127 @@ pub fn write(circle: &Circle, folder: &Out) -> Result<Vec<PathBuf>, Error> {
     }
     Ok(results.finish()?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn motion(name: &str, value: f64) -> Motion {
+        Motion {
+            name: name.into(),
+            dt: 0.5,
+            displacement: vec![0.0, value],
+            velocity: vec![0.0, 2.0 * value],
+            acceleration: vec![0.0, -value],
+            notes: Vec::new(),
+            seed: None,
+            across: None,
+        }
+    }
+
+    #[test]
+    fn a_drive_is_written_with_what_is_expected_of_it() {
+        let expected = |percent| Expected {
+            time_domain_percent: percent,
+            response_spectrum_percent: None,
+            peak_command_v: 2.5,
+        };
+        let circle = Circle {
+            case: "case-1".into(),
+            motion: "wave".into(),
+            effects: vec!["seal_friction".into()],
+            motion_itself: expected(9.0),
+            nominal_drive: expected(5.0),
+            extended_drive: expected(1.0),
+            corrections_percent: vec![4.0, 1.0],
+            warnings: Vec::new(),
+            drive: Some(motion("drive", 0.25)),
+            unaware: None,
+            wanted: None,
+        };
+        let percents = circle
+            .expected()
+            .map(|(name, own)| (name, own.time_domain_percent));
+        assert_eq!(
+            percents,
+            [
+                ("the motion itself", 9.0),
+                ("computed on the nominal model", 5.0),
+                ("computed on the extended model", 1.0),
+            ]
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::new(folder.path().join("out"));
+        assert_eq!(write(&circle, &out).unwrap().len(), 2);
+        let text = std::fs::read_to_string(out.join(DRIVE)).unwrap();
+        assert_eq!(
+            text,
+            "time [s],displacement [m],velocity [m/s],acceleration [m/s^2]\n0,0,0,0\n0.5,0.25,0.5,-0.25\n"
+        );
+        let text = std::fs::read_to_string(out.join(FIGURES)).unwrap();
+        let read: Circle = serde_json::from_str(&text).unwrap();
+        assert_eq!(read.expected(), circle.expected());
+        assert_eq!(name_of(Path::new("a/b/case-1")), "case-1");
+    }
+
+    #[test]
+    fn the_motion_is_the_file_that_is_named_or_the_built_in_one() {
+        let plan = Plan {
+            case: "case".into(),
+            model: "model.toml".into(),
+            record: None,
+            reference: None,
+            scaling: None,
+            seed: 3,
+            search: Search::default(),
+        };
+        assert_eq!(super::motion(&plan, 0.002).unwrap().seed, Some(3));
+        let named = Plan {
+            record: Some("/no/such/record.AT2".into()),
+            ..plan.clone()
+        };
+        assert!(
+            super::motion(&named, 0.002)
+                .unwrap_err()
+                .to_string()
+                .contains("record.AT2")
+        );
+        let named = Plan {
+            reference: Some("/no/such/reference.csv".into()),
+            ..plan.clone()
+        };
+        assert!(
+            super::motion(&named, 0.002)
+                .unwrap_err()
+                .to_string()
+                .contains("reference.csv")
+        );
+        let told = close(&plan).err().unwrap().to_string();
+        assert!(told.contains("nominal.toml"), "{told}");
+    }
+
+    #[test]
+    fn a_drive_of_another_length_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("drive.csv");
+        let options = motion::Options::default();
+        let wanted = motion::built_in(1, &options).unwrap();
+        std::fs::write(&path, drive::text(&wanted)).unwrap();
+        let read = drive::read(&path, &wanted).unwrap();
+        assert_eq!(
+            (read.len(), read.displacement[777]),
+            (wanted.len(), wanted.displacement[777])
+        );
+        let mut longer = wanted.clone();
+        longer.displacement.push(0.0);
+        let told = drive::read(&path, &longer).unwrap_err().to_string();
+        assert!(
+            told.contains(&format!(
+                "a drive of {} samples; expected {}",
+                wanted.len(),
+                longer.len()
+            )),
+            "{told}"
+        );
+    }
+}

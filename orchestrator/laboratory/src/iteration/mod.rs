@@ -530,3 +530,118 @@ fn pair(record: &Record, first: &str, second: &str) -> Option<(String, [Vec<f64>
         Some((name.to_string(), [column(first)?, column(second)?]))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+
+    fn plan(drive: Option<&std::path::Path>, drive_y: Option<&std::path::Path>) -> Plan {
+        Plan {
+            request: Request::built_in("three-variable"),
+            iterations: 3,
+            gain: 1.0,
+            target_percent: 1.0,
+            band: [0.2, 25.0],
+            exposure: None,
+            measurement_delay: None,
+            dummy_mass: None,
+            drive: drive.map(Into::into),
+            drive_y: drive_y.map(Into::into),
+        }
+    }
+
+    #[test]
+    fn the_first_drive_is_that_of_an_earlier_session_or_the_motion() {
+        let wanted = made::wave("wave", 200);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("drive.csv");
+        let earlier = Motion {
+            displacement: wanted.displacement.iter().map(|x| 1.5 * x).collect(),
+            ..wanted.clone()
+        };
+        std::fs::write(&path, drive_text(&earlier)).unwrap();
+        assert_eq!(first_drive(&plan(None, None), &wanted).unwrap(), wanted);
+        let own = first_drive(&plan(Some(&path), None), &wanted).unwrap();
+        assert!((own.displacement[33] / earlier.displacement[33] - 1.0).abs() < 1e-9);
+        let told = first_drive(&plan(None, Some(&path)), &wanted)
+            .unwrap_err()
+            .to_string();
+        assert!(told.contains("three-variable has a single axis"), "{told}");
+        let both = wanted.clone().along_two_axes(wanted.clone());
+        let own = first_drive(&plan(None, Some(&path)), &both).unwrap();
+        assert_eq!(own.displacement, wanted.displacement);
+        let across = own.across.unwrap();
+        assert!((across.displacement[33] / earlier.displacement[33] - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_axis_at_rest_is_measured_by_the_peak_of_the_other() {
+        let wave = made::wave("wave", 500);
+        let still = wave.at_rest();
+        let peak = wave.peak_acceleration();
+        assert_eq!(peaks(&[&wave, &still]), [peak, peak]);
+        assert_eq!(peaks(&[&still]), [0.0]);
+    }
+
+    #[test]
+    fn a_run_gives_what_sensors_show_as_early_as_it_was() {
+        let columns = |names: &[&str]| {
+            let names = names.iter().map(ToString::to_string);
+            std::iter::once("time".to_string())
+                .chain(names)
+                .collect::<Vec<_>>()
+        };
+        let own = columns(&[
+            "a.displacement",
+            "a.acceleration",
+            "table.displacement",
+            "table.acceleration",
+        ]);
+        let record =
+            Record::of(own, vec![0.0, 1.0, 2.0, 3.0, 4.0], Vec::new(), Vec::new()).unwrap();
+        // The table comes before others, whatever their order.
+        let found = pair(&record, "displacement", "acceleration").unwrap();
+        assert_eq!(found, ("table".to_string(), [vec![3.0], vec![4.0]]));
+        assert!(pair(&record, "displacement", "velocity").is_none());
+        let reference = columns(&["reference.displacement", "reference.acceleration"]);
+        let record = Record::of(reference, vec![0.0, 1.0, 2.0], Vec::new(), Vec::new()).unwrap();
+        assert!(pair(&record, "displacement", "acceleration").is_none());
+        let prepared = made::prepared(made::wave("wave", 300), made::follows);
+        let played = play(&prepared, made::wave("drive", 400), 0).unwrap();
+        let axis = &played.axes[0];
+        assert_eq!(
+            (played.ended.kind(), axis.displacement.len()),
+            (Ending::Complete, 400)
+        );
+        // Without sensors the table itself is seen, which is not late.
+        let late = play(&prepared, made::wave("drive", 400), 7).unwrap();
+        assert_eq!(late.axes[0].measured.displacement, axis.displacement);
+        let told = single(&prepared, &record).unwrap_err().to_string();
+        assert!(
+            told.contains("rig has no component with `displacement` and `acceleration`"),
+            "{told}"
+        );
+        let links = made::links(&["table.displacement -> sensors.displacement"]);
+        let table = Table::among(["table"].into_iter(), &links, &record).unwrap();
+        let names = [
+            "table.displacement",
+            "table.acceleration",
+            "sensors.measured_displacement",
+            "sensors.measured_acceleration",
+        ];
+        let record = Record::of(
+            columns(&names),
+            vec![0.0, 1.0, 2.0, 3.0, 4.0],
+            Vec::new(),
+            Vec::new(),
+        )
+        .unwrap();
+        let (moved, shown) = seen(&table, &links, &record).unwrap();
+        assert_eq!(
+            (moved, shown),
+            ([vec![1.0], vec![2.0]], Some([vec![3.0], vec![4.0]]))
+        );
+        assert!(seen(&table, &[], &record).unwrap().1.is_none());
+    }
+}

@@ -215,3 +215,132 @@ fn page(plan: &Plan, iteration: &Iteration) -> Report {
         ..Report::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::iteration::{AlongY, Line, Run, Stop};
+    use crate::run::experiment::Request;
+    use fmi_master::Ending;
+    use pages::report::UnitSystem;
+
+    fn run(iteration: usize, measured: Option<f64>) -> Run {
+        Run {
+            iteration,
+            measured_percent: measured,
+            along_y: None,
+            time_domain_percent: measured.map(|own| own + 0.5),
+            frequency_domain_percent: Some(0.25),
+            response_spectrum_percent: None,
+            exposure: 1.0 + iteration as f64,
+            gain: 0.7,
+            ended: Ending::Complete,
+            ended_because: None,
+        }
+    }
+
+    fn plan() -> Plan {
+        Plan {
+            request: Request {
+                set: vec!["table.mass=600 kg".into()],
+                ..Request::built_in("three-variable")
+            },
+            iterations: 3,
+            gain: 0.7,
+            target_percent: 1.0,
+            band: [0.2, 25.0],
+            exposure: Some(10.0),
+            measurement_delay: None,
+            dummy_mass: Some(120.0),
+            drive: None,
+            drive_y: None,
+        }
+    }
+
+    fn iteration() -> Iteration {
+        let mut last = run(2, None);
+        last.ended = Ending::Interlock;
+        last.ended_because = Some("the table left its reference".into());
+        let line = |frequency, gain, coherence| Line {
+            frequency,
+            gain,
+            coherence,
+        };
+        Iteration {
+            system: "three-variable".into(),
+            motion: "wave".into(),
+            coherence: 0.987_65,
+            runs: vec![run(0, Some(8.0)), run(1, Some(2.5)), last],
+            best: 1,
+            stop: Stop::EndedEarly,
+            converges: true,
+            drive: None,
+            errors: Some((0.002, vec![1.0, -2.0], vec![0.5, 0.25])),
+            response: vec![line(1.0, 0.9, 0.99), line(2.0, 1.1, 0.95)],
+        }
+    }
+
+    #[test]
+    fn the_page_of_an_iteration_has_a_row_for_each_run() {
+        let mut all = vec![expected::text_of(
+            &page(&plan(), &iteration()),
+            UnitSystem::Us,
+        )];
+        let mut both = iteration();
+        for (n, run) in both.runs.iter_mut().enumerate() {
+            run.along_y = Some(AlongY {
+                measured_percent: Some(1.5 * n as f64),
+                time_domain_percent: None,
+            });
+        }
+        both.errors = None;
+        both.response.clear();
+        let bare = Plan {
+            request: Request::built_in("mpc"),
+            exposure: None,
+            dummy_mass: None,
+            ..plan()
+        };
+        all.push(expected::text_of(&page(&bare, &both), UnitSystem::Si));
+        let text = all
+            .join("\n======\n")
+            .replace(env!("CARGO_PKG_VERSION"), "VERSION");
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "iteration.txt", &text);
+    }
+
+    #[test]
+    fn the_best_drives_are_written_for_each_axis() {
+        let motion = motion::built_in(1, &motion::Options::default()).unwrap();
+        let both = motion.clone().along_two_axes(motion);
+        let own = Iteration {
+            drive: Some(both),
+            ..iteration()
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let written = write(&plan(), &own, &Out::new(folder.path().join("out"))).unwrap();
+        let names: Vec<_> = written
+            .iter()
+            .filter_map(|path| path.file_name()?.to_str())
+            .collect();
+        for name in [ITERATION, DRIVE, DRIVE_Y, report::FILE] {
+            assert!(names.contains(&name), "{names:?}");
+        }
+    }
+
+    #[test]
+    fn every_end_of_an_iteration_has_its_sentence() {
+        let all = [
+            Stop::Target,
+            Stop::Iterations,
+            Stop::Stalled,
+            Stop::Diverges,
+            Stop::Exposure,
+            Stop::EndedEarly,
+        ];
+        let mut sentences = all.map(Stop::sentence).to_vec();
+        assert!(sentences.iter().all(|own| own.len() > 20), "{sentences:?}");
+        sentences.sort_unstable();
+        sentences.dedup();
+        assert_eq!(sentences.len(), all.len());
+    }
+}

@@ -203,3 +203,86 @@ impl Outputs {
         usual.find_map(|name| self.find("", name, "m").ok())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outputs(all: &[(&str, Option<&str>)]) -> Outputs {
+        let owned =
+            |(name, unit): &(&str, Option<&str>)| ((*name).to_string(), unit.map(str::to_string));
+        Outputs {
+            all: all.iter().map(owned).collect(),
+        }
+    }
+
+    #[test]
+    fn an_output_is_found_with_its_sign_and_factor() {
+        let own = outputs(&[("a.force", Some("kN")), ("a.x", Some("m")), ("a.y", None)]);
+        let found = |name: &str, unit: &str| own.find("--force-signal", name, unit);
+        let channel = found("-a.force", "N").unwrap();
+        assert_eq!((&*channel.name, channel.factor), ("a.force", -1000.0));
+        assert_eq!(found("a.y", "N").unwrap().factor, 1.0);
+        assert!(found("a.x", "N").is_err(), "a length is not a force");
+        let told = found("a.forse", "N").unwrap_err().to_string();
+        assert!(
+            told.contains("no output `a.forse`") && told.contains("a.force"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn the_usual_force_is_that_of_the_specimen_or_the_only_one() {
+        let usual = |all: &[(&str, Option<&str>)]| {
+            outputs(all)
+                .usual_force()
+                .map_err(|error| error.to_string())
+        };
+        let specimen = usual(&[("specimen.force", Some("N")), ("a.force", Some("N"))]).unwrap();
+        assert_eq!((&*specimen.name, specimen.factor), ("specimen.force", -1.0));
+        let only = usual(&[("a.force", Some("kN")), ("a.x", Some("m")), ("a.y", None)]).unwrap();
+        assert_eq!((&*only.name, only.factor), ("a.force", 1000.0));
+        let both = usual(&[("a.force", Some("N")), ("b.force", Some("N"))]).unwrap_err();
+        assert!(both.ends_with("there are a.force, b.force"), "{both}");
+        let none = usual(&[("a.x", Some("m"))]).unwrap_err();
+        assert!(
+            none.ends_with("none of the system's outputs is a force in N"),
+            "{none}"
+        );
+        let place = |all: &[(&str, Option<&str>)]| outputs(all).usual_displacement();
+        assert_eq!(
+            place(&[("plant.displacement", Some("mm"))]).unwrap().factor,
+            0.001
+        );
+        assert!(place(&[("a.displacement", Some("m"))]).is_none());
+    }
+
+    #[test]
+    fn a_trial_moves_what_is_named_or_the_reference() {
+        let file = |links: &[&str]| SystemFile {
+            connections: links
+                .iter()
+                .map(|text| fmi_system::Link::try_from((*text).to_string()).unwrap())
+                .collect(),
+            ..SystemFile::default()
+        };
+        let wanted = |names: &[&str]| ElementFile {
+            command: names.iter().map(ToString::to_string).collect(),
+            ..ElementFile::default()
+        };
+        let follows = file(&["reference.displacement -> a.u"]);
+        let none = file(&["b.y -> a.u"]);
+        assert_eq!(
+            command(&none, &wanted(&["reference"])).unwrap(),
+            Command::Reference
+        );
+        assert_eq!(command(&follows, &wanted(&[])).unwrap(), Command::Reference);
+        let inputs = ["a.u", "a.v"];
+        assert_eq!(
+            command(&follows, &wanted(&inputs)).unwrap(),
+            Command::Inputs(inputs.map(String::from).to_vec())
+        );
+        let told = command(&none, &wanted(&[])).unwrap_err().to_string();
+        assert!(told.contains("the system follows no motion"), "{told}");
+    }
+}

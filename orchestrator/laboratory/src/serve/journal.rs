@@ -78,3 +78,57 @@ impl Journal {
         self.file.write_all(self.row.as_bytes())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bridges::element::{Measured, Trial};
+    use std::time::Duration;
+
+    #[test]
+    fn every_step_is_a_row_with_its_degrees_of_freedom() {
+        let folder = tempfile::tempdir().unwrap();
+        let written = |degrees: usize| {
+            let mut journal = Journal::create(&folder.path().join("out"), degrees).unwrap();
+            let mut trial = Trial {
+                displacement: vec![0.5; degrees],
+                time: Some(0.25),
+                ..Trial::default()
+            };
+            let measured = Measured {
+                displacement: vec![0.25; degrees],
+                force: vec![-3.0; degrees],
+                time: 1.5,
+                ..Measured::default()
+            };
+            for number in 1..=2 {
+                let step = Step {
+                    number,
+                    trial: &trial,
+                    measured: &measured,
+                    trials: 4,
+                    answer: Duration::from_millis(125),
+                };
+                journal.add(&step).unwrap();
+                trial.time = None;
+            }
+            std::fs::read_to_string(folder.path().join("out").join(EXCHANGES)).unwrap()
+        };
+        let head = "step,time [s],rig time [s],trials,answer [s]";
+        assert_eq!(
+            written(1),
+            format!(
+                "{head},trial displacement [m],displacement [m],force [N]\n1,0.25,1.5,4,0.125,0.5,0.25,-3\n\
+                 2,,1.5,4,0.125,0.5,0.25,-3\n"
+            )
+        );
+        assert_eq!(
+            written(2),
+            format!(
+                "{head},trial displacement 1 [m],trial displacement 2 [m],displacement 1 [m],displacement 2 [m],\
+                 force 1 [N],force 2 [N]\n1,0.25,1.5,4,0.125,0.5,0.5,0.25,0.25,-3,-3\n\
+                 2,,1.5,4,0.125,0.5,0.5,0.25,0.25,-3,-3\n"
+            )
+        );
+    }
+}
