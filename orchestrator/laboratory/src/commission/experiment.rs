@@ -164,3 +164,109 @@ fn shown(record: &Record, names: &[&str]) -> Result<Vec<f64>, Error> {
         ),
     })
 }
+
+#[cfg(test)]
+impl Bench {
+    /// A bench whose table follows with nine tenths.
+    pub(super) fn made() -> Self {
+        use crate::made;
+        Self {
+            prepared: made::prepared(made::wave("wave", 10), made::follows),
+            specimen: false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn motion_is_lively_where_it_is_more_than_white_noise() {
+        let mut state = 7_u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let noise: Vec<f64> = (0..2000).map(|_| uniform()).collect();
+        let wave = |size: f64| -> Vec<f64> {
+            let noise = noise.iter().enumerate();
+            noise
+                .map(|(n, own)| own + size * (0.02 * n as f64).sin())
+                .collect()
+        };
+        assert!(!is_lively(&noise) && !is_lively(&wave(0.5)));
+        assert!(is_lively(&wave(10.0)));
+    }
+
+    #[test]
+    fn the_first_column_that_is_there_is_recorded() {
+        let names = ["time", "table.x", "sensors.x"].map(String::from).to_vec();
+        let record = Record::of(names, vec![0.0, 1.0, 2.0], Vec::new(), Vec::new()).unwrap();
+        assert_eq!(shown(&record, &["sensors.x", "table.x"]).unwrap(), [2.0]);
+        assert_eq!(shown(&record, &["other.x", "table.x"]).unwrap(), [1.0]);
+        let told = shown(&record, &["a.x", "b.x"]).unwrap_err().to_string();
+        assert!(told.contains("expected an output a.x or b.x"), "{told}");
+        let channels = vec![(Channel::Displacement, vec![0.25, -0.5])];
+        let played = Played {
+            recording: Recording::new("one", 0.002, channels).unwrap(),
+            ended: None,
+        };
+        assert_eq!(played.peak(Channel::Displacement), 0.5);
+    }
+
+    #[test]
+    fn a_bench_records_what_the_sensors_show_of_a_motion() {
+        use crate::made;
+        let mut bench = Bench::made();
+        assert_eq!(bench.dt(), 0.002);
+        let law = bench.law();
+        assert_eq!((law.proportional, law.integral_leak), (25.0, 0.5));
+        assert_eq!(law.limit, Pid::equation_3_6().limit);
+        let motion = made::wave("other", 400);
+        let played = bench.play(motion.clone()).unwrap();
+        assert_eq!(
+            (
+                played.ended,
+                &*played.recording.name,
+                played.recording.len()
+            ),
+            (None, "other", 400)
+        );
+        let samples = |channel| played.recording.samples(channel);
+        assert_eq!(samples(Channel::Reference), motion.displacement);
+        let near = |found: f64, wanted: f64| {
+            assert!(
+                (found / wanted - 1.0).abs() < 1e-9,
+                "{found} is not {wanted}"
+            )
+        };
+        near(
+            peak(samples(Channel::Displacement)),
+            0.9 * motion.peak_displacement(),
+        );
+        near(
+            peak(samples(Channel::ActuatorForce)),
+            450.0 * motion.peak_acceleration(),
+        );
+        near(
+            peak(samples(Channel::ValveCommand)),
+            25.0 * motion.peak_displacement(),
+        );
+        assert!(
+            played
+                .recording
+                .channel(Channel::SpecimenAcceleration)
+                .is_none()
+        );
+        // With a specimen its acceleration must be there.
+        bench.specimen = true;
+        let told = bench.play(motion).err().unwrap().to_string();
+        assert!(
+            told.contains("measured_specimen_acceleration or specimen.acceleration"),
+            "{told}"
+        );
+    }
+}

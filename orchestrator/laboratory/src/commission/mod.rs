@@ -673,3 +673,138 @@ fn write_recording(recording: &Recording, file: &mut dyn std::io::Write) -> std:
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refusal_names_the_error_its_bound_and_the_causes() {
+        let causes = ["valve dead band".to_string(), "unexplained".to_string()];
+        let told = refused(Some(12.345), &causes);
+        assert!(
+            told.starts_with(
+                "the model predicts other motions with an error of 12 %, more than 5 % (valve dead band, unexplained): \
+                 no controller"
+            ),
+            "{told}"
+        );
+        assert!(
+            told.ends_with(&format!(
+                "{CONTROLLER}.toml has the gains of the recordings"
+            )),
+            "{told}"
+        );
+        let none = refused(None, &causes[1..]);
+        assert!(
+            none.starts_with("the model predicts other motions with no prediction at all, more"),
+            "{none}"
+        );
+        let told = does_not_run("the stroke").to_string();
+        assert!(
+            told.contains("at the smallest motion: the stroke; expected a rig"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn a_recording_is_written_with_units_and_times_to_the_microsecond() {
+        let channels = vec![
+            (Channel::Reference, vec![0.0, 0.5]),
+            (Channel::ValveCommand, vec![1.25, -2.0]),
+        ];
+        let recording = Recording::new("one", 0.002, channels).unwrap();
+        let mut text = Vec::new();
+        write_recording(&recording, &mut text).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        let mut lines = text.lines();
+        let mut heads: Vec<&str> = lines.next().unwrap().split(',').collect();
+        assert_eq!(heads.remove(0), "time [s]");
+        heads.sort_unstable();
+        assert_eq!(heads, ["reference [m]", "valve_command [V]"]);
+        let rows: Vec<&str> = lines.collect();
+        assert_eq!(rows.len(), 2);
+        assert!(
+            rows[0].starts_with("0.000000,") && rows[1].starts_with("0.002000,"),
+            "{text}"
+        );
+        assert!(rows[1].contains("0.5") && rows[1].contains("-2"), "{text}");
+    }
+
+    #[test]
+    fn a_motion_that_cannot_be_read_is_refused_at_once() {
+        assert!(check_motion(&request(None, None)).is_ok());
+        assert!(check_motion(&request(Some("/no/such/record.AT2"), None)).is_err());
+        assert!(check_motion(&request(None, Some("/no/such/reference.csv"))).is_err());
+        let own = excitation(&request(None, None), 0.004);
+        assert_eq!(
+            (own.band, own.duration, own.dt, own.seed),
+            (BAND, 60.0, 0.004, 1)
+        );
+    }
+
+    fn request(record: Option<&str>, reference: Option<&str>) -> Request {
+        Request {
+            plant: "servohydraulic".into(),
+            specimen: "none".into(),
+            set: Vec::new(),
+            level: 3.0,
+            stroke: 0.1,
+            duration: 60.0,
+            seed: 1,
+            sensor_delay: 0.002,
+            record: record.map(PathBuf::from),
+            reference: reference.map(PathBuf::from),
+            played: 10.0,
+            fmi: FmiVersion::V3,
+            installation: Installation::default(),
+        }
+    }
+
+    #[test]
+    fn an_excitation_grows_twofold_a_trial_up_to_its_level_or_part_of_the_stroke() {
+        let dt = 0.002;
+        let shape = crate::made::wave("wave", 1500).displacement;
+        let wave = crate::made::wave("wave", 1500);
+        let own = request(None, None);
+        let mut bench = Bench::made();
+        let (scale, trials) = grow(&mut bench, &own, &shape).unwrap();
+        // From two hundredths of the stroke, twofold each time.
+        let references: Vec<f64> = trials.iter().map(|trial| trial.reference_m).collect();
+        assert!(
+            (references[0] - 0.02 * own.stroke).abs() < 1e-12,
+            "{references:?}"
+        );
+        assert!(
+            (references[1] / references[0] - 2.0).abs() < 1e-9,
+            "{references:?}"
+        );
+        // An acceleration of 3 m/s2 needs less travel than four tenths of the stroke.
+        let last = trials.last().unwrap();
+        assert!(
+            (last.acceleration_m_s2 / own.level - 1.0).abs() < 0.06,
+            "{last:?}"
+        );
+        let omega = (wave.peak_acceleration() / wave.peak_displacement()).sqrt();
+        assert!(
+            (last.reference_m * 0.9 * omega * omega / own.level - 1.0).abs() < 0.1,
+            "{last:?}"
+        );
+        assert!(
+            (scale * wave.peak_displacement() / last.reference_m - 1.0).abs() < 0.06,
+            "{scale}"
+        );
+        assert!(trials.iter().all(|trial| trial.ended.is_none()) && dt > 0.0);
+        // With much to spare in acceleration the stroke limits.
+        let far = Request {
+            level: 1000.0,
+            ..own
+        };
+        let (_, trials) = grow(&mut bench, &far, &shape).unwrap();
+        let last = trials.last().unwrap();
+        assert!(
+            (last.reference_m / (STROKE_PART * far.stroke) - 1.0).abs() < 0.06,
+            "{last:?}"
+        );
+    }
+}

@@ -168,3 +168,142 @@ impl Limits {
         ((low * digits).floor() / digits, name)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+    use crate::run::experiment::Request;
+
+    fn limits(hydraulics: Option<Hydraulics>) -> Limits {
+        Limits {
+            displacement: 0.1,
+            stopping: 0.05,
+            velocity: 0.5,
+            acceleration: 10.0,
+            force: 5000.0,
+            mass: 1000.0,
+            hydraulics,
+        }
+    }
+
+    fn motion(displacement: &[f64], velocity: &[f64], acceleration: &[f64]) -> Motion {
+        Motion {
+            displacement: displacement.to_vec(),
+            velocity: velocity.to_vec(),
+            acceleration: acceleration.to_vec(),
+            ..made::wave("wave", 0)
+        }
+    }
+
+    fn share(all: &[Use], name: &str) -> (f64, f64) {
+        let own = all.iter().find(|own| own.limit == name).unwrap();
+        (own.share, own.time_s)
+    }
+
+    #[test]
+    fn a_motion_uses_its_largest_part_of_each_limit_at_its_time() {
+        let motion = motion(&[0.0, -0.04, 0.02], &[0.1, -0.4, 0.3], &[2.0, 1.0, -3.0]);
+        let all = limits(None).used(&motion, 0.5);
+        let near = |name: &str, wanted: f64, sample: usize| {
+            let (found, time) = share(&all, name);
+            assert!((found - wanted).abs() < 1e-12, "{name}: {found}");
+            assert!(
+                (time - 0.002 * sample as f64).abs() < 1e-12,
+                "{name}: {time} s"
+            );
+        };
+        near("displacement", 0.2, 1);
+        near("stopping distance", 0.5 * (0.04 + 0.4 * 0.05) / 0.1, 1);
+        near("velocity", 0.4, 1);
+        near("acceleration", 0.15, 2);
+        near("force", 1000.0 * 1.5 / 5000.0, 2);
+        let shares: Vec<f64> = all.iter().map(|own| own.share).collect();
+        assert!(shares.windows(2).all(|two| two[0] >= two[1]), "{shares:?}");
+        assert_eq!(all.len(), 5);
+    }
+
+    #[test]
+    fn valve_and_flow_are_used_by_velocity_and_load() {
+        let own = Hydraulics {
+            area: 0.01,
+            coefficient: 1e-7,
+            command: 10.0,
+            pressure: 2e7,
+            flow: 0.002,
+            flow_time: 0.004,
+        };
+        let motion = motion(&[0.0; 2], &[0.2, -0.2], &[1.0, 4.0]);
+        let all = limits(Some(own.clone())).used(&motion, 1.0);
+        // The load takes pressure where it drives, and gives some where it brakes.
+        let valve = |a: f64| 0.01 * 0.2 / (1e-7 * 10.0 * (0.5 * (2e7 - a * 1000.0 / 0.01)).sqrt());
+        let (found, time) = share(&all, "valve");
+        assert!(
+            (found - valve(1.0)).abs() < 1e-9 && time == 0.0,
+            "{found} at {time} s"
+        );
+        // The mean of a level from rest: 1 - exp(-t/T) of it.
+        let part = 1.0 - (-0.004_f64 / 0.004).exp();
+        let (found, _) = share(&all, "flow");
+        assert!((found - part * 0.01 * 0.2 / 0.002).abs() < 1e-9, "{found}");
+        let none = Hydraulics { flow: 0.0, ..own };
+        assert!(
+            limits(Some(none))
+                .used(&motion, 1.0)
+                .iter()
+                .all(|own| own.limit != "flow")
+        );
+    }
+
+    #[test]
+    fn the_level_uses_85_percent_of_the_first_limit_rounded_down() {
+        let small = motion(&[0.01], &[0.0], &[0.0]);
+        assert_eq!(limits(None).level(&small), (1.0, None));
+        let large = motion(&[0.3], &[0.0], &[0.0]);
+        // 0.085 / 0.3 = 0.2833..., to three digits.
+        let (level, limit) = limits(None).level(&large);
+        assert!((level - 0.283).abs() < 1e-12, "{level}");
+        assert!(["displacement", "stopping distance"].contains(&limit.as_deref().unwrap()));
+        let fast = motion(&[0.0], &[0.0], &[20.0]);
+        assert_eq!(limits(None).level(&fast).1.as_deref(), Some("force"));
+    }
+
+    #[test]
+    fn limits_are_those_of_the_manifest_or_of_the_laboratory() {
+        let mut manifest = made::manifest(&Request::built_in("mpc"), &made::wave("wave", 3));
+        let usual = Interlock::laboratory();
+        let own = Limits::of(&manifest);
+        assert_eq!(
+            (own.displacement(), own.force),
+            (usual.displacement_limit, usual.force_limit)
+        );
+        // Table and specimen.
+        assert_eq!((own.mass, own.hydraulics), (600.0, None));
+        let mut interlock = manifest.components["control"].clone();
+        interlock.parameters = [
+            ("displacement_limit", 0.05),
+            ("reaction_time", 0.1),
+            ("ramp_time", 0.3),
+            ("saturation_level", 9.0),
+        ]
+        .map(|(name, value)| (name.to_string(), (value.into(), None)))
+        .into();
+        manifest.components.insert("interlock".into(), interlock);
+        let table = manifest.components.get_mut("table").unwrap();
+        for (name, value) in [
+            ("piston_area", 0.01),
+            ("flow_coefficient", 1e-7),
+            (vocabulary::PUMP_PRESSURE, 2e7),
+        ] {
+            table.parameters.insert(name.into(), (value.into(), None));
+        }
+        let own = Limits::of(&manifest);
+        assert_eq!((own.displacement(), own.stopping), (0.05, 0.1 + 0.5 * 0.3));
+        let hydraulics = own.hydraulics.unwrap();
+        assert_eq!(
+            (hydraulics.area, hydraulics.command, hydraulics.pressure),
+            (0.01, 9.0, 2e7)
+        );
+        assert_eq!(hydraulics.flow, usual.flow_limit);
+    }
+}

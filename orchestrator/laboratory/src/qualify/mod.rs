@@ -627,3 +627,188 @@ fn play(prepared: &Prepared, drive: Motion, run: usize) -> Result<Played, Error>
         ended: outcome.ended,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+
+    fn plan(rule: &Rule, rounds: usize) -> Plan {
+        Plan {
+            rule: rule.clone(),
+            record: None,
+            seed: 3,
+            request: None,
+            motion_only: false,
+            rounds,
+            search: None,
+            set_after: Vec::new(),
+        }
+    }
+
+    fn stated(rule: &Rule, motion: &Motion) -> Qualification {
+        let matched = Matched {
+            motion: motion.clone(),
+            ratios: [0.98, 1.2],
+            rounds: 0,
+        };
+        let entries = entries(&[matched], std::slice::from_ref(motion));
+        Qualification {
+            rule: rule.clone(),
+            system: None,
+            motion: entries[0].clone(),
+            further_axes: Vec::new(),
+            correlation: None,
+            coherence: None,
+            level: 1.0,
+            limited_by: None,
+            limits: Vec::new(),
+            high_pass: Vec::new(),
+            rounds: Vec::new(),
+            approach: Vec::new(),
+            verdict: "falls short",
+            resonances_before: Vec::new(),
+            resonances_after: Vec::new(),
+            shifts: Vec::new(),
+            warnings: Vec::new(),
+            wall_s: 0.0,
+            motions: vec![motion.clone()],
+            best: None,
+            drive: None,
+            measured: Vec::new(),
+            searches: [None, None],
+            manifest: None,
+        }
+    }
+
+    fn short_rule() -> Rule {
+        let settings = ["s_ds=0.5", "duration_s=8"].map(String::from);
+        let load = qualification::load("ac156", &settings);
+        load.unwrap_or_else(|_| qualification::load("ac156", &settings[..1]).unwrap())
+    }
+
+    #[test]
+    fn runs_begin_at_a_quarter_and_a_half_and_the_best_drive_is_kept() {
+        let rule = short_rule();
+        let matched = matching::from_noise(&rule, 3, 0.002);
+        let motion = matched.motion;
+        let prepared = made::prepared(motion.clone(), made::follows);
+        let mut found = stated(&rule, &motion);
+        let mut said = Vec::new();
+        let request = Request::built_in("mpc");
+        let complete = rounds(
+            &plan(&rule, 2),
+            &request,
+            &prepared,
+            &rule,
+            &mut found,
+            &mut |words| {
+                said.push(words.to_string());
+            },
+        );
+        assert!(complete.unwrap());
+        let levels: Vec<f64> = found.approach.iter().map(|round| round.level).collect();
+        assert_eq!(levels, [0.25, 0.5]);
+        assert!((1..=2).contains(&found.rounds.len()));
+        assert_eq!(
+            said[..3],
+            [
+                "running at 25.0 % of the spectrum",
+                "running at 50.0 % of the spectrum",
+                "running at 100.0 % of the spectrum"
+            ]
+        );
+        // At first the table lacks a tenth, which the corrections of the drive bring.
+        let first = &found.approach[0];
+        assert!(
+            (first.highest_ratio / matched.ratios[1] - 0.9).abs() < 0.02,
+            "{first:?}"
+        );
+        assert!(
+            (first.exposure - (0.25_f64 * 0.9).powi(2)).abs() < 1e-3,
+            "{first:?}"
+        );
+        assert!((first.drive_peak_displacement_m - 0.25 * motion.peak_displacement()).abs() < 1e-9);
+        let last = found.rounds.last().unwrap();
+        assert!(
+            last.lowest_ratio > first.lowest_ratio + 0.05,
+            "{first:?} {last:?}"
+        );
+        assert!(found.best.is_some() && found.measured.len() == motion.len());
+        let drive = found.drive.as_ref().unwrap();
+        let more = drive.peak_acceleration() / motion.peak_acceleration();
+        assert!((1.02..1.3).contains(&more), "{more}");
+        assert_eq!(found.ended_early(), None);
+    }
+
+    #[test]
+    fn a_run_that_fails_ends_the_approach() {
+        fn runs_away(inputs: &[f64], outputs: &mut [f64]) {
+            made::follows(inputs, outputs);
+            outputs[0] *= -9.0;
+        }
+        let rule = short_rule();
+        let motion = made::wave("wave", 2000);
+        let prepared = made::prepared(motion.clone(), runs_away);
+        let mut found = stated(&rule, &motion);
+        let request = Request::built_in("mpc");
+        let complete = rounds(
+            &plan(&rule, 1),
+            &request,
+            &prepared,
+            &rule,
+            &mut found,
+            &mut |_| (),
+        );
+        assert!(!complete.unwrap());
+        assert_eq!((found.approach.len(), found.rounds.len()), (1, 0));
+        assert!(found.ended_early().is_some());
+    }
+
+    #[test]
+    fn a_lower_level_scales_motions_and_figures() {
+        let rule = short_rule();
+        let motion = made::wave("wave", 200);
+        let mut found = stated(&rule, &motion);
+        let before = found.motion.clone();
+        reduce(&mut found, None, 0.5);
+        assert_eq!(
+            (found.level, found.limited_by.as_deref()),
+            (0.5, Some("stopping distance"))
+        );
+        assert_eq!(found.motion.pga_g, 0.5 * before.pga_g);
+        assert_eq!(
+            found.motion.peak_velocity_m_s,
+            0.5 * before.peak_velocity_m_s
+        );
+        assert_eq!(
+            found.motion.peak_displacement_m,
+            0.5 * before.peak_displacement_m
+        );
+        assert_eq!(found.motions[0].velocity[7], 0.5 * motion.velocity[7]);
+        assert!(found.limits.is_empty());
+        assert!((before.pga_g - motion.peak_acceleration() / STANDARD_GRAVITY).abs() < 1e-12);
+        assert_eq!((before.lowest_ratio, before.highest_ratio), (0.98, 1.2));
+        let twice = [motion.clone(), motion];
+        found.motions = twice.to_vec();
+        alike(&rule, &mut found, 0.002);
+        assert!((found.correlation.unwrap() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn levels_of_later_bands_are_computed_where_slow_motion_limits() {
+        let rule = short_rule();
+        let manifest = made::manifest(&Request::built_in("mpc"), &made::wave("wave", 3));
+        let limits = Limits::of(&manifest);
+        let levels = |limited_by| high_pass(&plan(&rule, 0), Some(&limits), limited_by, 0.005);
+        assert!(levels(Some("acceleration")).is_empty() && levels(None).is_empty());
+        let all = levels(Some("velocity"));
+        let from: Vec<f64> = all
+            .iter()
+            .map(|own| own.from_hz / rule.band_hz[0])
+            .collect();
+        assert_eq!(from, HIGH_PASS);
+        assert!(all.iter().all(|own| own.level > 0.0 && own.level <= 1.0));
+        assert!(high_pass(&plan(&rule, 0), None, Some("velocity"), 0.005).is_empty());
+    }
+}

@@ -623,7 +623,14 @@ fn search_section(plan: &Plan, found: &Qualification) -> Section {
 
 #[cfg(test)]
 mod tests {
-    use super::percent;
+    use super::*;
+    use crate::made;
+    use crate::qualify::{HighPass, MotionEntry, Qualification, Use};
+    use crate::run::experiment::Request;
+    use fmi_master::Ending;
+    use pages::report::UnitSystem;
+    use qualification::matching;
+    use qualification::resonance::{Shift, Transfer};
 
     #[test]
     fn damping_is_in_percent_to_four_decimals() {
@@ -635,5 +642,228 @@ mod tests {
         ] {
             assert_eq!(percent(part), shown);
         }
+    }
+
+    fn round(level: f64, ended: Ending) -> Round {
+        Round {
+            level,
+            lowest_ratio: 0.95,
+            highest_ratio: 1.25,
+            verdict: "falls short",
+            exposure: 2.0 * level,
+            drive_peak_displacement_m: 0.05,
+            ended,
+            ended_because: (ended != Ending::Complete)
+                .then(|| "the table left its reference".into()),
+        }
+    }
+
+    fn qualification(rule: &Rule) -> Qualification {
+        let motion = made::wave("matched", 1500);
+        let entry = |n: usize, seed| MotionEntry {
+            file: motion_name(n, "csv").into(),
+            seed,
+            pga_g: 0.4,
+            peak_velocity_m_s: 0.2,
+            peak_displacement_m: 0.01,
+            lowest_ratio: 1.01,
+            highest_ratio: 1.29,
+            strong_motion_s: 2.5,
+        };
+        let resonance = |frequency_hz: f64| Resonance {
+            frequency_hz,
+            interval_95: [frequency_hz - 0.01, frequency_hz + 0.01],
+            damping: 0.05,
+            damping_interval_95: [0.045, 0.055],
+            gain: 9.5,
+            coherence: 0.99,
+        };
+        let found = |gain: f64| {
+            Some(Found {
+                resonances: Vec::new(),
+                transfer: Transfer {
+                    frequency_hz: vec![1.0, 2.0],
+                    gain: vec![1.0, gain],
+                    coherence: vec![0.9, 1.0],
+                },
+            })
+        };
+        let best = Verdict::new(
+            rule,
+            &motion.acceleration,
+            motion.dt,
+            vec!["a short record".into()],
+        );
+        Qualification {
+            rule: rule.clone(),
+            system: Some("mpc".into()),
+            motion: entry(0, Some(7)),
+            further_axes: vec![entry(1, None)],
+            correlation: Some(0.123),
+            coherence: Some(0.25),
+            level: 0.5,
+            limited_by: Some("stroke".into()),
+            limits: vec![Use {
+                limit: "stroke".into(),
+                share: 0.85,
+                time_s: 1.25,
+            }],
+            high_pass: vec![HighPass {
+                from_hz: 1.95,
+                level: 0.8,
+            }],
+            rounds: vec![round(0.5, Ending::Complete), round(0.5, Ending::Interlock)],
+            approach: vec![round(0.125, Ending::Complete)],
+            verdict: "falls short",
+            resonances_before: vec![resonance(1.0)],
+            resonances_after: vec![resonance(0.95)],
+            shifts: vec![Shift {
+                before_hz: 1.0,
+                after_hz: 0.95,
+                shift_percent: -5.0,
+                interval_95: [-6.0, -4.0],
+                changed: true,
+            }],
+            warnings: vec!["the motion is short".into()],
+            wall_s: 1.0,
+            drive: Some(motion.clone()),
+            measured: motion.acceleration.iter().map(|a| 0.9 * a).collect(),
+            searches: [found(9.5), found(8.0)],
+            manifest: None,
+            best: Some(best),
+            motions: vec![motion],
+        }
+    }
+
+    fn plan(rule: &Rule) -> Plan {
+        Plan {
+            rule: rule.clone(),
+            record: None,
+            seed: 7,
+            request: Some(Request {
+                set: vec!["table.mass=600 kg".into()],
+                ..Request::built_in("mpc")
+            }),
+            motion_only: false,
+            rounds: 2,
+            search: None,
+            set_after: Vec::new(),
+        }
+    }
+
+    fn shown(report: &Report) -> String {
+        expected::text_of(report, UnitSystem::Si).replace(env!("CARGO_PKG_VERSION"), "VERSION")
+    }
+
+    #[test]
+    fn a_qualification_is_reported_with_spectra_runs_and_resonances() {
+        let rule = qualification::load("ac156", &[]).unwrap();
+        let own = qualification(&rule);
+        assert_eq!(own.ended_early(), Some("the table left its reference"));
+        let mut all = vec![shown(&page(&plan(&rule), &own))];
+        // Only the motion, which no limit of a rig bounds.
+        let bare = Qualification {
+            limited_by: None,
+            level: 1.0,
+            limits: Vec::new(),
+            high_pass: Vec::new(),
+            rounds: Vec::new(),
+            approach: Vec::new(),
+            searches: [None, None],
+            measured: Vec::new(),
+            drive: None,
+            correlation: None,
+            ..own
+        };
+        assert_eq!(bare.ended_early(), None);
+        let without = Plan {
+            request: None,
+            ..plan(&rule)
+        };
+        all.push(shown(&page(&without, &bare)));
+        let rule = qualification::load("ieee693", &["damping_percent=5".into()]).unwrap();
+        let motion = made::wave("record", 1000);
+        let record = Record {
+            name: "record".into(),
+            origin: "a sine".into(),
+            dt: motion.dt,
+            acceleration: motion.acceleration.clone(),
+            seed: None,
+        };
+        let verdict = Verdict::new(&rule, &record.acceleration, record.dt, Vec::new());
+        all.push(shown(&trs_page(&rule, &record, &verdict)));
+        expected::compare(
+            env!("CARGO_MANIFEST_DIR"),
+            "qualification.txt",
+            &all.join("\n======\n"),
+        );
+    }
+
+    #[test]
+    fn motions_and_spectra_are_written_as_files() {
+        let rule = qualification::load("ac156", &[]).unwrap();
+        let own = qualification(&rule);
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::new(folder.path().join("out"));
+        let written = write(&plan(&rule), &own, &out).unwrap();
+        let mut names: Vec<_> = written
+            .iter()
+            .filter_map(|path| path.file_name()?.to_str())
+            .collect();
+        names.sort_unstable();
+        assert_eq!(
+            names,
+            [
+                "drive.csv",
+                "measured.csv",
+                "motion.AT2",
+                "motion.csv",
+                "qualification.json",
+                "report.html",
+                "spectra.csv",
+                "spectra.svg",
+            ]
+        );
+        let text = motion_at2(&Motion {
+            acceleration: vec![
+                STANDARD_GRAVITY,
+                -0.5 * STANDARD_GRAVITY,
+                0.0,
+                0.0,
+                0.0,
+                2.0 * STANDARD_GRAVITY,
+            ],
+            displacement: vec![0.0; 6],
+            ..made::wave("step", 0)
+        });
+        assert_eq!(
+            text,
+            "SHAKEBENCH MATCHED MOTION\nstep\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS=      6, DT= 0.0020 SEC\n\
+             \u{20}    1.0000000e0   -5.0000000e-1     0.0000000e0     0.0000000e0     0.0000000e0\n\
+             \u{20}    2.0000000e0\n"
+        );
+        assert_eq!(
+            record_text(&[0.0, STANDARD_GRAVITY], 0.1),
+            "t_s,a_g\n0,0\n0.1,1\n"
+        );
+        assert_eq!(
+            [0, 1].map(|n| motion_name(n, "csv")),
+            ["motion.csv", "motion-2.csv"]
+        );
+        let points = std::fs::read_to_string(out.join(POINTS)).unwrap();
+        assert_eq!(points.lines().count(), own.best.unwrap().points.len() + 1);
+    }
+
+    #[test]
+    fn a_motion_that_was_matched_envelops_its_spectrum() {
+        let rule = qualification::load("ac156", &["s_ds=0.5".into()]).unwrap();
+        let matched = matching::from_noise(&rule, 3, 0.005);
+        let verdict = Verdict::new(&rule, &matched.motion.acceleration, 0.005, Vec::new());
+        let told = sentence(&rule, &verdict);
+        assert_eq!(
+            told.contains("envelops the required one"),
+            verdict.envelops(),
+            "{told}"
+        );
     }
 }

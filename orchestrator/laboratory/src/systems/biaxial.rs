@@ -96,3 +96,110 @@ fn share_payload(file: &mut SystemFile) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AXIS: &str = r#"
+name = "one"
+description = "a table"
+[components.control]
+fmu = "DisplacementPid"
+period = "2 ms"
+[components.table]
+fmu = "ServoHydraulicTable"
+[components.sensors]
+fmu = "Instrumentation"
+parameters = { seed = 1 }
+[components.specimen]
+fmu = "SPECIMEN"
+[components.interlock]
+fmu = "Interlock"
+inputs = { stop = false }
+[experiment]
+stop = "interlock.stop"
+"#;
+
+    fn both(specimen: &str) -> SystemFile {
+        let links = [
+            "reference.displacement[2] -> control.reference_displacement",
+            "control.valve_command -> table.valve_command",
+            "specimen.force -> table.specimen_force",
+            "table.acceleration -> specimen.table_acceleration",
+        ];
+        let links: Vec<String> = links.iter().map(|link| format!("{link:?}")).collect();
+        let head = format!("connections = [{}]\n", links.join(", "));
+        let text = head + &AXIS.replace("SPECIMEN", specimen);
+        on_two_axes(SystemFile::parse("one", &text).unwrap())
+    }
+
+    fn connections(file: &SystemFile) -> Vec<String> {
+        file.connections.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_specimen_of_one_storey_becomes_a_payload_on_both_axes() {
+        let file = both("Specimen");
+        let names: Vec<&str> = file.components.keys().map(String::as_str).collect();
+        assert_eq!(
+            names,
+            [
+                "control",
+                "control_y",
+                "interlock",
+                "interlock_y",
+                "sensors",
+                "sensors_y",
+                "specimen",
+                "table",
+                "table_y"
+            ]
+        );
+        let payload = &file.components["specimen"];
+        assert_eq!(payload.fmu, "EccentricPayload");
+        assert_eq!(
+            payload.parameters["eccentricity_y"],
+            Setting::Text("0 in".into())
+        );
+        assert_eq!(
+            file.components["sensors_y"].parameters["seed"],
+            Setting::Integer(2)
+        );
+        assert_eq!(
+            file.components["sensors"].parameters["seed"],
+            Setting::Integer(1)
+        );
+        assert_eq!(
+            connections(&file),
+            [
+                "reference.displacement[2] -> control.reference_displacement",
+                "control.valve_command -> table.valve_command",
+                "specimen.force_x -> table.specimen_force",
+                "table.acceleration -> specimen.table_acceleration_x",
+                "reference.displacement_y[2] -> control_y.reference_displacement",
+                "control_y.valve_command -> table_y.valve_command",
+                "specimen.force_y -> table_y.specimen_force",
+                "table_y.acceleration -> specimen.table_acceleration_y",
+                "interlock_y.tripped -> interlock.stop",
+            ]
+        );
+        assert!(file.experiment.stop.is_none());
+        assert!(file.components["interlock"].inputs.is_empty());
+        assert!(!file.components["interlock_y"].inputs.is_empty());
+        assert_eq!(file.description, "a table, along two axes");
+    }
+
+    #[test]
+    fn of_another_specimen_each_axis_has_its_own() {
+        let file = both("StoreysSpecimen");
+        let of = |name: &str| &*file.components[name].fmu;
+        assert_eq!(
+            (of("specimen"), of("specimen_y")),
+            ("StoreysSpecimen", "StoreysSpecimen")
+        );
+        assert!(
+            connections(&file).contains(&"specimen_y.force -> table_y.specimen_force".to_string())
+        );
+    }
+}

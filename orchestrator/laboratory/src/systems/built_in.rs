@@ -406,4 +406,151 @@ mod tests {
         assert!(known(&named) && measured(&named));
         assert!((stiffness(&named) / own.stiffness - 0.8).abs() < 1e-9);
     }
+
+    /// Components, parameters by name, and connections of a system.
+    fn outline(file: &SystemFile) -> String {
+        let mut text = format!("{} ({}): {}\n", file.name, file.origin, file.description);
+        for (name, own) in &file.components {
+            let period = own
+                .period
+                .as_ref()
+                .map_or(String::new(), |period| format!(" every {period}"));
+            let parameters: Vec<&str> = own.parameters.keys().map(String::as_str).collect();
+            text += &format!("  {name}: {}{period}, {}\n", own.fmu, parameters.join(" "));
+        }
+        for link in &file.connections {
+            text += &format!("  {link}\n");
+        }
+        text
+    }
+
+    #[test]
+    fn systems_have_the_parts_of_their_names() {
+        let on = |name: &str, plant: &str, specimen: &str| {
+            system(name, plant, specimen, Wanted::default()).unwrap()
+        };
+        let mut text = String::new();
+        for name in [
+            "displacement-pid",
+            "three-variable",
+            "loop-shaping",
+            "sliding-mode",
+            "mpc",
+        ] {
+            text += &outline(&on(name, "identified", "linear"));
+        }
+        text += &outline(&on("displacement-pid", "servohydraulic", NONE));
+        text += &outline(&on("displacement-pid", "servohydraulic", "storeys"));
+        text += &outline(&on(
+            "displacement-pid+friction+delta-p",
+            "servohydraulic",
+            "yielding",
+        ));
+        text += &outline(&on("displacement-pid", biaxial::PLANT, "linear"));
+        let mut file = on("displacement-pid", "servohydraulic", "yielding");
+        add_structure(&mut file, "two-storeys", "servohydraulic").unwrap();
+        text += &outline(&file);
+        let mut file = on("displacement-pid", "servohydraulic", NONE);
+        let before = outline(&file);
+        add_structure(&mut file, NONE, "servohydraulic").unwrap();
+        assert_eq!(outline(&file), before);
+        add_structure(&mut file, "two-storeys", "servohydraulic").unwrap();
+        text += &outline(&file);
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "systems.txt", &text);
+    }
+
+    #[test]
+    fn unknown_names_are_refused_with_what_there_is() {
+        let told = |name: &str| check(name).map_err(|error| error.to_string());
+        assert_eq!(told("mpc+friction+delta-p"), Ok(()));
+        for (name, expected) in [
+            ("mcp", "mpc"),
+            ("mpc+fricton", "friction"),
+            ("wave.AT2", "pass a motion with --record or --reference"),
+            ("wave.csv", "pass a motion with --record or --reference"),
+            (".", "it is a folder"),
+        ] {
+            let told = told(name).unwrap_err();
+            assert!(told.contains(expected), "{name}: {told}");
+        }
+        assert!(system("mpc", "identifed", NONE, Wanted::default()).is_err());
+        assert!(system("mpc", "identified", "linar", Wanted::default()).is_err());
+        assert!(system("mpc", "identified", "opensees:", Wanted::default()).is_err());
+        let mut file = system("mpc", "identified", NONE, Wanted::default()).unwrap();
+        assert!(add_structure(&mut file, "three-storeys", "identified").is_err());
+        let told = add_structure(&mut file, "two-storeys", biaxial::PLANT)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.contains("a computed structure has a single axis"),
+            "{told}"
+        );
+        assert_eq!(
+            plants().collect::<Vec<_>>(),
+            ["identified", "servohydraulic", "biaxial"]
+        );
+        assert_eq!(
+            ["identified", "servohydraulic", "biaxial"].map(is_commissioned),
+            [false, true, true]
+        );
+        assert_eq!(
+            (specimens().next(), structures().collect::<Vec<_>>()),
+            (Some(NONE), vec![NONE, "two-storeys"])
+        );
+        assert_eq!(
+            (specimen_path("linear"), plant_path("identified")),
+            ("linear".into(), "identified".into())
+        );
+        let here = std::path::absolute("a.toml").unwrap();
+        assert_eq!(plant_path("a.toml"), here.display().to_string());
+        assert!(specimen_path("opensees:a.py").ends_with("/a.py"));
+    }
+
+    #[test]
+    fn printed_parameters_are_those_of_the_identified_plant() {
+        use crate::systems::tuning::Tuning;
+        let wanted = |tuning, model| Wanted {
+            tuning,
+            model,
+            ..Wanted::default()
+        };
+        let gain = |plant: &str, tuning| {
+            let file = system("displacement-pid", plant, NONE, wanted(tuning, None)).unwrap();
+            file.components["control"]
+                .parameters
+                .get("proportional_gain")
+                .map(ToString::to_string)
+        };
+        let printed = Some(Tuning::Printed);
+        assert_eq!(gain("servohydraulic", printed), gain("identified", None));
+        assert_ne!(
+            gain("servohydraulic", Some(Tuning::Tuned)),
+            gain("servohydraulic", printed)
+        );
+        assert_eq!(
+            gain("servohydraulic", Some(Tuning::Tuned)),
+            gain("servohydraulic", None)
+        );
+        let told = |plant: &str, wanted| {
+            system("displacement-pid", plant, NONE, wanted)
+                .unwrap_err()
+                .to_string()
+        };
+        let none = told("identified", wanted(Some(Tuning::Tuned), None));
+        assert!(
+            none.contains("there is no tuning for the plant `identified`"),
+            "{none}"
+        );
+        let model = Path::new("model.toml");
+        let both = told("servohydraulic", wanted(printed, Some(model)));
+        assert!(
+            both.contains("printed parameters do not use `--control-model`"),
+            "{both}"
+        );
+        let gone = told(
+            "servohydraulic",
+            wanted(None, Some(Path::new("/no/such/model.toml"))),
+        );
+        assert!(gone.contains("/no/such/model.toml"), "{gone}");
+    }
 }

@@ -332,4 +332,97 @@ mod tests {
         assert!((spool.spool_lag - 5e-4).abs() < 1e-15);
         assert!(spool.spool_inertia > 0.0);
     }
+
+    #[test]
+    fn draws_have_the_standard_errors_of_the_coefficients() {
+        let mut errors = ShakeTable::default();
+        let zero = [0.0; 3];
+        (
+            errors.actuator.denominator,
+            errors.actuator.voltage_to_force,
+        ) = (zero, zero);
+        errors.actuator.velocity_to_force = zero;
+        let size = 0.05 * errors.table.mass;
+        (errors.table.damping, errors.table.stiffness) = (0.0, 0.0);
+        errors.table.mass = size;
+        let own = ControlModel {
+            uncertainty: Uncertainty::Coefficients(Box::new(errors)),
+            late: 0.004,
+            ..ControlModel::identified()
+        };
+        let draws = own.draws(400, 3);
+        assert_eq!(draws.len(), 400);
+        let masses: Vec<f64> = draws
+            .iter()
+            .map(|draw| draw.rig.table.mass - own.rig.table.mass)
+            .collect();
+        let mean = masses.iter().sum::<f64>() / 400.0;
+        let deviation = (masses.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / 399.0).sqrt();
+        // Four standard errors of mean and deviation.
+        let (mean, deviation) = (mean / size, deviation / size);
+        assert!(
+            mean.abs() < 0.2 && (deviation - 1.0).abs() < 0.15,
+            "{mean} {deviation}"
+        );
+        for draw in &draws {
+            assert_eq!((draw.late, draw.rig.actuator), (0.004, own.rig.actuator));
+            assert_eq!(draw.rig.table.damping, own.rig.table.damping);
+        }
+        assert_eq!(own.draws(5, 3), draws[..5]);
+        assert_ne!(own.draws(5, 4), draws[..5]);
+        assert!(ControlModel::identified().draws(5, 3).is_empty());
+    }
+
+    #[test]
+    fn draws_of_the_commissioned_rig_are_near_it() {
+        let own = ControlModel::commissioned().unwrap();
+        let draws = own.draws(40, 1);
+        assert!(draws.len() > 30, "{}", draws.len());
+        let far = |draw: &Draw| (draw.rig.table.mass / own.rig.table.mass - 1.0).abs();
+        let most = draws.iter().map(far).fold(0.0, f64::max);
+        assert!(most > 1e-5 && most < 0.2, "{most}");
+    }
+
+    /// `sqrt(2) Q^(3/4) R^(1/4)` with densities of the two noises, and floors below which sensors err otherwise.
+    #[test]
+    fn the_noise_of_the_velocity_is_that_of_a_filter_of_the_others() {
+        let own = Noise::of(1e-4, 0.5);
+        let densities = [0.5_f64, 1e-4].map(|size| size * size * SAMPLING_PERIOD);
+        let variance = 2.0_f64.sqrt() * densities[0].powf(0.75) * densities[1].powf(0.25);
+        assert!((own.velocity / variance.sqrt() - 1.0).abs() < 1e-12);
+        assert_eq!((own.displacement, own.acceleration), (1e-4, 0.5));
+        let least = Noise::of(0.0, 0.0);
+        assert_eq!(
+            (least.displacement, least.acceleration),
+            (1e-4 * INCH, 0.01 * G)
+        );
+        let model = ControlModel::identified();
+        let measured = model.measurements();
+        assert_eq!(
+            measured.noise,
+            [least.displacement, least.velocity, least.acceleration]
+        );
+        assert_eq!(
+            (measured.late, measured.period, model.delay),
+            (0.0, SAMPLING_PERIOD, 0)
+        );
+    }
+
+    #[test]
+    fn a_delay_is_split_into_that_of_the_valve_and_of_the_sensors() {
+        let mut file = ModelFile::parse(COMMISSIONED, "own").unwrap();
+        file.command_delay = Some(3.4 * SAMPLING_PERIOD);
+        file.sensor_delay = Some(SAMPLING_PERIOD);
+        let own = ControlModel::new(&file, "own").unwrap();
+        assert_eq!((own.delay, own.command_delay), (3, 2));
+        assert!(
+            (own.fraction - 0.4 * SAMPLING_PERIOD).abs() < 1e-12,
+            "{}",
+            own.fraction
+        );
+        assert!((own.late - 3.4 * SAMPLING_PERIOD).abs() < 1e-15);
+        file.sensor_delay = None;
+        let own = ControlModel::new(&file, "own").unwrap();
+        assert_eq!((own.command_delay, own.fraction), (0, 0.0));
+    }
 }

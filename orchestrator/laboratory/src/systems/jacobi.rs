@@ -103,3 +103,76 @@ fn longest_path(
     let fits = |seen: &[&String]| seen.contains(&by) == through;
     walk(at, next, sampled, &mut Vec::new(), &fits)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmi_system::{ComponentFile, Link};
+
+    const LOOP: &str = vocabulary::LOOP_DELAY_SAMPLES;
+
+    /// Sensors, a controller, an interlock and a table, of which the table alone is continuous.
+    fn file(own: Option<i64>) -> SystemFile {
+        let mut file = SystemFile::default();
+        for (name, is_sampled) in [
+            ("sensors", true),
+            ("control", true),
+            ("interlock", true),
+            ("table", false),
+        ] {
+            let mut part = ComponentFile::new(name);
+            if is_sampled {
+                part = part.period(Setting::Text("2 ms".into()));
+            }
+            file.add(name, part);
+        }
+        if let (Some(own), Some(control)) = (own, file.components.get_mut("control")) {
+            control.set(LOOP, own);
+        }
+        let links = [
+            "table.displacement -> sensors.displacement",
+            "sensors.measured_displacement -> control.displacement",
+            "control.valve_command -> interlock.controller_command",
+            "interlock.valve_command -> table.valve_command",
+            "interlock.tripped -> control.tripped",
+        ];
+        file.connections = links
+            .map(|text| Link::try_from(text.to_string()).unwrap())
+            .to_vec();
+        file
+    }
+
+    fn told(mut file: SystemFile, is_built_in: bool, known: &[(&str, &str)]) -> Vec<(String, i64)> {
+        know_jacobi(&mut file, is_built_in, &mut |fmu, parameter| {
+            known.contains(&(fmu, parameter))
+        });
+        let control = &file.components["control"].parameters;
+        let whole = control.iter().filter_map(|(name, value)| match value {
+            Setting::Integer(samples) => Some((name.clone(), *samples)),
+            _ => None,
+        });
+        whole.collect()
+    }
+
+    #[test]
+    fn every_sampled_component_of_the_loop_is_a_sample_late() {
+        let own = ("control", LOOP);
+        let samples = |count| vec![(LOOP.to_string(), count)];
+        assert_eq!(told(file(None), false, &[own]), samples(3));
+        // What a file says stays; a built-in system says the delay of its rig.
+        assert_eq!(told(file(Some(2)), false, &[own]), samples(2));
+        assert_eq!(told(file(Some(2)), true, &[own]), samples(5));
+        // A component that knows no delay is told none.
+        assert_eq!(told(file(None), false, &[("sensors", LOOP)]), []);
+        let command = ("control", vocabulary::COMMAND_DELAY_SAMPLES);
+        let mut both = samples(3);
+        both.push((command.1.to_string(), 1));
+        both.sort();
+        assert_eq!(told(file(None), false, &[own, command]), both);
+        // Of a law that predicts the law below it, ways past it count: there is none here.
+        assert_eq!(
+            told(file(None), false, &[own, ("control", "continuous_law")]),
+            []
+        );
+    }
+}

@@ -78,3 +78,33 @@ pub fn fmu_of(
     let component = component.map_err(|error| error.to_string())?;
     Ok(pack::with_resource(&component.path, CARRIED, script)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+
+    #[test]
+    fn models_become_the_component_that_runs_them() {
+        let text = "name = \"one\"\n[components.frame]\nfmu = \"opensees:frame.py\"\n[components.table]\nfmu = \"ShakeTable\"\n";
+        let mut file = SystemFile::parse("one", text).unwrap();
+        file.directory = Some("/models".into());
+        find_models(&mut file);
+        let frame = &file.components["frame"];
+        assert_eq!(frame.fmu, COMPONENT);
+        assert_eq!(
+            frame.parameters[MODEL],
+            fmi_system::Setting::Text("/models/frame.py".into())
+        );
+        let table = &file.components["table"];
+        assert_eq!((&*table.fmu, table.parameters.len()), ("ShakeTable", 0));
+        // A foreign FMU of that name carries no model.
+        let variables = r#"<String name="model" valueReference="1" causality="parameter" variability="fixed"><Start value=""/></String>"#;
+        assert!(
+            carrying(&made::component(COMPONENT, variables))
+                .unwrap()
+                .is_none()
+        );
+        assert!(is_empty(&Value::Text(String::new())) && !is_empty(&Value::Text("a".into())));
+    }
+}
