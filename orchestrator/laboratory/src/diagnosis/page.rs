@@ -487,3 +487,188 @@ fn extended_case(case: &Case, model: &ExtendedModel) -> Section {
         ..Section::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn gain(before: f64) -> Value {
+        json!({
+            "before_nrmse": before, "after_nrmse": 0.05, "noise_floor_nrmse": 0.04, "interval_95": [0.6, 0.9],
+            "record": "validation", "before_ratio": before / 0.04, "after_ratio": 1.25,
+            "channels": {
+                "actuator_force": [0.5, 0.06, 0.05], "displacement": [0.3, 0.03, 0.03],
+            },
+        })
+    }
+
+    /// A report on a case with these effects and alternatives.
+    fn case(verdict: &str, effects: Value) -> DiagnosisReport {
+        let report = json!({
+            "sentence": "The valve has a dead band.", "verdict": verdict, "effects": effects,
+            "alternatives": [["valve_flow_gain", "seal_friction"]],
+            "separating_experiment": "a triangle of 2 mm", "separating_motion": "case/separating.csv",
+            "gain": gain(0.4), "extended_model": null, "extended_fmu": null, "extended_fmus": [],
+            "notes": ["The record is short."], "wall_s": 12.34,
+            "co_simulation": gain(0.8),
+            "relations": {
+                "R1 valve": {"nominal": 9.0, "estimated": 1.1, "healthy": 1.0},
+                "R2 force": {"nominal": 1.2, "estimated": 1.1, "healthy": 1.0},
+                "R3 specimen": {"nominal": 3.0, "estimated": 2.5, "healthy": 1.0},
+                "R4 sensors": {"nominal": 1.0, "estimated": 1.0, "healthy": null},
+                "R5 law": {"nominal": 1.31, "estimated": 1.29, "healthy": 1.0},
+                "all": {"nominal": 2.0, "estimated": 1.3, "healthy": 1.0},
+            },
+            "remaining": [["a", 9.0], ["b", 8.0], ["c", 7.0], ["d", 6.0], ["e", 5.25], ["f", 4.0]],
+            "share_explained": 0.9,
+        });
+        serde_json::from_value(report).unwrap()
+    }
+
+    fn dead_band() -> Value {
+        json!({
+            "effect": "valve_dead_band", "confidence": 0.9995,
+            "parameters": {"half_width": {"value": 0.25, "unit": "V", "standard_error": 0.01}},
+        })
+    }
+
+    fn friction() -> Value {
+        json!({
+            "effect": "seal_friction", "confidence": 0.951,
+            "parameters": {
+                "force": {"value": 1000.0, "unit": "N", "standard_error": 20.0},
+                "velocity": {"value": 0.01, "unit": "m/s", "standard_error": null},
+            },
+        })
+    }
+
+    /// A report on a rig of this kind, fitted and tested on its two parts.
+    fn rig(verdict: &str, kind: &str, effects: Value) -> DiagnosisReport {
+        let value = |name: &str, value: f64, unit: &str| json!({"name": name, "value": value, "unit": unit, "standard_error": 0.012_34});
+        let part = |extended: f64| {
+            json!({
+                "nominal_error": 0.5, "refitted_error": 0.4, "extended_error": extended, "fitted_error": 0.09,
+                "gain_interval": [0.5, 0.95], "parameters": [], "effects": [], "explained": 0.9,
+                "rivals": [["play", "friction"]],
+            })
+        };
+        let report = json!({
+            "sentence": "The arm has friction.", "verdict": verdict, "effects": effects, "alternatives": [],
+            "separating_experiment": "a slow triangle",
+            "gain": {"before_nrmse": 0.5, "after_nrmse": 0.1, "noise_floor_nrmse": null, "interval_95": [0.1, 0.2],
+                "record": "held out"},
+            "extended_model": null, "extended_fmu": null, "extended_fmus": [], "notes": [], "wall_s": 3.0,
+            "unexplained_share": 0.123,
+            "rig": {
+                "name": "arm", "kind": kind, "output": "position", "verdict": verdict, "named": ["friction"],
+                "not_confirmed": [], "as_described": part(0.1), "swapped": part(0.2),
+                "confirmed": {
+                    "error": 0.12, "swapped_error": 0.22, "gain_interval": [0.4, 0.8], "refitted_error": 0.4,
+                    "fitted_error": 0.1, "refitted": [value("mass", 2.5, "kg")],
+                    "parameters": [value("mass", 2.25, "kg")],
+                    "effects": [["friction", [value("force", 12.345_678, "N")]]],
+                },
+                "unexplained": 0.123,
+            },
+        });
+        serde_json::from_value(report).unwrap()
+    }
+
+    fn shown(report: &DiagnosisReport, units: UnitSystem) -> String {
+        let page = again(Path::new("out"), report, None, units);
+        expected::text_of(&page, units).replace(env!("CARGO_PKG_VERSION"), "VERSION")
+    }
+
+    #[test]
+    fn a_case_is_reported_on_the_terminal_and_on_its_page() {
+        let found = case("named", json!([dead_band(), friction()]));
+        let mut all = Vec::new();
+        for units in [UnitSystem::Us, UnitSystem::Si] {
+            all.extend([text::text(&found, units), shown(&found, units)]);
+        }
+        let none = case("adequate", json!([]));
+        all.extend([
+            text::text(&none, UnitSystem::Si),
+            shown(&none, UnitSystem::Si),
+        ]);
+        let unexplained = case("unexplained", json!([dead_band()]));
+        all.push(text::text(&unexplained, UnitSystem::Si));
+        expected::compare(
+            env!("CARGO_MANIFEST_DIR"),
+            "diagnosis-case.txt",
+            &all.join("\n======\n"),
+        );
+    }
+
+    #[test]
+    fn a_rig_is_reported_on_the_terminal_and_on_its_page() {
+        let mut own = friction();
+        own["on_every_part"] = true.into();
+        let mut other = dead_band();
+        other["on_every_part"] = false.into();
+        other["parameters"] = json!({});
+        let mut all = Vec::new();
+        for (verdict, kind) in [
+            ("named", "arm"),
+            ("ambiguous", KIND),
+            ("unexplained", "arm"),
+        ] {
+            let found = rig(verdict, kind, json!([own, other]));
+            all.extend([
+                text::text(&found, UnitSystem::Us),
+                shown(&found, UnitSystem::Us),
+            ]);
+        }
+        expected::compare(
+            env!("CARGO_MANIFEST_DIR"),
+            "diagnosis-rig.txt",
+            &all.join("\n======\n"),
+        );
+    }
+
+    #[test]
+    fn a_verdict_is_explained_in_a_sentence_of_its_own() {
+        let sentence = |report: &DiagnosisReport| findings(report, UnitSystem::Si).text[0].clone();
+        let verdicts = ["adequate", "named", "ambiguous", "too_small", "unexplained"];
+        let mut all: Vec<String> = verdicts.map(|own| sentence(&case(own, json!([])))).to_vec();
+        all.extend(verdicts.map(|own| sentence(&rig(own, "arm", json!([])))));
+        // An effect that is too small is so on a case and on a rig; what is named or ambiguous is the same on a rig.
+        assert_eq!((&all[3], &all[6]), (&all[8], &all[7]));
+        all.sort();
+        all.dedup();
+        assert_eq!(all.len(), 8);
+    }
+
+    #[test]
+    fn a_foreign_model_has_its_pictures_before_the_extended_model() {
+        let report = rig("named", KIND, json!([friction()]));
+        let panel = pages::report::Panel {
+            title: "position".into(),
+            x: pages::report::Axis::linear("time", pages::report::Units::TIME),
+            y: pages::report::Axis::linear("position", pages::report::Units::NONE),
+            series: Vec::new(),
+        };
+        let page = of_foreign(
+            "arm",
+            Path::new("arm.fmu"),
+            &report,
+            vec![panel],
+            UnitSystem::Si,
+        );
+        let headings: Vec<&str> = page.sections.iter().map(|own| &*own.heading).collect();
+        assert_eq!(
+            headings,
+            [
+                "What was found",
+                "What it brings",
+                "Measured and simulated",
+                "The extended model"
+            ]
+        );
+        assert_eq!(
+            (page.sections[2].panels.len(), &*page.title),
+            (1, "Diagnosis of arm")
+        );
+    }
+}

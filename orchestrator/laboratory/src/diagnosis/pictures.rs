@@ -254,3 +254,86 @@ fn spectrum(name: &str, errors: &[f64], period: f64) -> Series {
         .map(|sum| (sum / f64::max(count, 1.0)).sqrt());
     Series::line(name, Abscissa::At(frequency), root.collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn places(series: &Series) -> Vec<f64> {
+        match &series.abscissa {
+            Abscissa::At(places) => places.to_vec(),
+            Abscissa::Even { start, step } => (0..series.values.len())
+                .map(|n| start + n as f64 * step)
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn a_slope_is_taken_over_a_tenth_of_a_second() {
+        let line: Vec<f64> = (0..100).map(|n| 3.0 * 0.01 * f64::from(n)).collect();
+        for slope in slope(&line, 0.01) {
+            assert!((slope - 3.0).abs() < 1e-9, "{slope}");
+        }
+        let step: Vec<f64> = (0..100).map(|n| f64::from(u8::from(n >= 50))).collect();
+        let found = slope(&step, 0.01);
+        // Ten steps wide, ten per second high.
+        assert_eq!(found.iter().filter(|own| **own > 0.0).count(), 10);
+        assert!((found[50] - 10.0).abs() < 1e-9);
+        assert_eq!(slope(&[1.0], 0.01), [0.0]);
+    }
+
+    #[test]
+    fn errors_are_averaged_in_bins_of_the_state() {
+        let state: Vec<f64> = (0..80).rev().map(f64::from).collect();
+        let errors: Vec<f64> = state.iter().map(|x| 2.0 * x + 1.0).collect();
+        let own = binned("model", &state, &errors);
+        assert_eq!(own.values.len(), 40);
+        assert_eq!((places(&own)[0], own.values[0]), (0.5, 2.0));
+        assert_eq!((places(&own)[39], own.values[39]), (78.5, 158.0));
+        assert!(binned("none", &[], &[]).values.is_empty());
+    }
+
+    /// Noise of size one gives 1 on average; a sine is where its frequency is.
+    #[test]
+    fn a_spectrum_shows_noise_as_one_and_a_sine_at_its_frequency() {
+        let period = 0.01;
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let noise: Vec<f64> = (0..20_000)
+            .map(|_| 12.0_f64.sqrt() * (uniform() - 0.5))
+            .collect();
+        let own = spectrum("noise", &noise, period);
+        let square = own.values.iter().map(|own| own * own).sum::<f64>() / own.values.len() as f64;
+        assert!((square - 1.0).abs() < 0.05, "{square}");
+        assert_eq!((places(&own)[0], own.values.len()), (0.5, 100));
+        let sine: Vec<f64> = (0..2000)
+            .map(|n| (std::f64::consts::TAU * 5.0 * 0.01 * f64::from(n)).sin())
+            .collect();
+        let own = spectrum("sine", &sine, period);
+        let most = (0..own.values.len()).max_by(|a, b| own.values[*a].total_cmp(&own.values[*b]));
+        assert!((places(&own)[most.unwrap()] - 5.0).abs() < 1e-9);
+        assert!(
+            spectrum("short", &[1.0, 2.0], period)
+                .values
+                .iter()
+                .all(|own| *own == 0.0)
+        );
+    }
+
+    #[test]
+    fn a_band_is_an_outline_and_channels_have_words_and_units() {
+        let own = band(0.5, 5, 2.0);
+        assert_eq!(places(&own), [0.0, 2.0, 2.0, 0.0, 0.0]);
+        assert_eq!(own.values, [2.0, 2.0, -2.0, -2.0, 2.0]);
+        let all: Vec<String> = (0..OUTPUT_NAMES.len()).map(words).collect();
+        assert_eq!(all[0], "displacement");
+        assert!(all.iter().all(|own| !own.contains('_')));
+        let names = [0, 1, 2, 3].map(|n| units(n).si.to_string());
+        assert_eq!(names, ["mm", "g", "kN", "g"]);
+    }
+}

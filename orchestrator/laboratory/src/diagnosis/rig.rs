@@ -212,3 +212,88 @@ fn close_look(found: &RigDiagnosis, rig: &dyn Rig, curves: &Curves) -> Panel {
         ],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curves() -> Curves {
+        let samples = 200;
+        let at = |size: f64| -> Vec<f64> {
+            (0..samples)
+                .map(|n| size * (0.1 * f64::from(n)).sin())
+                .collect()
+        };
+        let mut nominal = at(0.8);
+        nominal[150] = 5.0;
+        Curves {
+            record: "one".into(),
+            is_timed: true,
+            time: (0..samples).map(|n| 0.01 * f64::from(n)).collect(),
+            input: at(2.0),
+            measured: at(1.0),
+            nominal,
+            extended: at(0.99),
+            left_out: (0..samples).map(|n| n >= 100).collect(),
+        }
+    }
+
+    fn drawn(panel: &Panel) -> String {
+        expected::plot(panel)
+    }
+
+    #[test]
+    fn errors_are_those_of_the_held_out_data() {
+        let own = curves();
+        let errors = errors(&own, &own.nominal);
+        assert!(errors[..100].iter().all(|error| error.is_nan()));
+        assert_eq!(errors[150], own.measured[150] - 5.0);
+        let many: Vec<f64> = (0..4000).map(f64::from).collect();
+        let few = thin(&many);
+        assert_eq!((few.len(), few[1]), (1334, 3.0));
+        assert_eq!((step(&own), thin(&own.input).len()), (0.01, 200));
+        assert_eq!(
+            ["m", "N", "V", "Pa", "1"].map(|si| units(si).si.to_string()),
+            ["mm", "kN", "V", "MPa", ""]
+        );
+    }
+
+    #[test]
+    fn every_kind_of_rig_has_its_pictures() {
+        let mut text = String::new();
+        let mut shapes = Vec::new();
+        for kind in KINDS_DRAWN {
+            let rig = of_kind(kind).unwrap();
+            let found = crate::made::rig_diagnosis(kind);
+            let all = pictures(&found, &[curves()]);
+            assert_eq!(all.len(), 2);
+            shapes.push(rig.is_hysteretic());
+            text += &format!("{kind}\n");
+            text += &all.iter().map(drawn).collect::<String>();
+            text += &drawn(&overlay(&found, &[curves()]).unwrap());
+        }
+        assert_eq!(shapes, [true, false]);
+        assert!(pictures(&crate::made::rig_diagnosis("none"), &[curves()]).is_empty());
+        assert!(overlay(&crate::made::rig_diagnosis(KINDS_DRAWN[0]), &[]).is_none());
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "rig-pictures.txt", &text);
+    }
+
+    #[test]
+    fn curves_of_a_folder_are_read_where_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(curves_again(folder.path()).unwrap().is_none());
+        let rig = of_kind(KINDS_DRAWN[1]).unwrap();
+        let file = File::create(folder.path().join(CURVES)).unwrap();
+        let (before, one) = (curves(), curves().record);
+        curves::write(&[curves()], rig.inputs()[0], rig.output(), file).unwrap();
+        let found = curves_again(folder.path()).unwrap().unwrap();
+        assert_eq!((found.len(), &found[0].record), (1, &one));
+        assert_eq!(
+            (&found[0].nominal, &found[0].left_out),
+            (&before.nominal, &before.left_out)
+        );
+    }
+
+    /// A hysteretic one and another one.
+    const KINDS_DRAWN: [&str; 2] = ["controlled_damper", "linear_axis"];
+}

@@ -330,4 +330,144 @@ mod tests {
             assert_eq!(finer(&[], 3, between), [0.0]);
         }
     }
+
+    /// Files of `rows` samples 10 ms apart: time in ms, a force in kN and a displacement with gaps.
+    fn files(folder: &Path, rows: usize) -> Vec<PathBuf> {
+        let names = ["a.csv", "b.csv"].into_iter();
+        let files = names.map(|name| {
+            let mut text = String::from("t [ms],force [kN],x\n");
+            for n in 0..rows {
+                let x = if n % 10 == 3 {
+                    String::new()
+                } else {
+                    format!("{}", 0.5 * n as f64)
+                };
+                text += &format!("{},{},{x}\n", 10 * n, n % 4);
+            }
+            let path = folder.join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        });
+        files.collect()
+    }
+
+    fn map(more: &str) -> Map {
+        let text = format!(
+            "{more}\n[inputs]\nu = \"force\"\n[outputs]\ny = {{ column = \"x\", unit = \"mm\" }}\n"
+        );
+        toml::from_str(&text).unwrap()
+    }
+
+    fn signal(name: &str, unit: &str) -> [Signal; 1] {
+        [Signal {
+            name: name.into(),
+            unit: unit.into(),
+        }]
+    }
+
+    fn read(more: &str, rows: usize) -> Result<Vec<Trial>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let files = files(folder.path(), rows);
+        let found = trials(
+            &map(more),
+            Path::new("map.toml"),
+            &files,
+            &signal("u", "N"),
+            &signal("y", "m"),
+        );
+        found.map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn columns_are_read_in_the_units_of_the_model() {
+        let step = "step = { value = 5.0, unit = \"ms\" }\nbetween = \"hold\"";
+        let all = read(step, 200).unwrap();
+        let own = &all[0];
+        assert_eq!((&*own.name, own.stride, own.samples()), ("a", 2, 200));
+        assert!((own.step - 0.005).abs() < 1e-12);
+        assert_eq!(own.inputs[0][..5], [0.0, 0.0, 1000.0, 1000.0, 2000.0]);
+        assert!((own.outputs[0][2] - 0.001).abs() < 1e-15 && own.outputs[0][3].is_nan());
+        // By default the second half is held out.
+        assert_eq!(own.left_out.iter().position(|out| *out), Some(100));
+    }
+
+    #[test]
+    fn data_are_held_out_by_blocks_or_files() {
+        let blocks = read(
+            "left_out = { every_second_block = { value = 0.5, unit = \"s\" } }",
+            200,
+        )
+        .unwrap();
+        let out: Vec<usize> = (0..200).filter(|&k| blocks[1].left_out[k]).collect();
+        assert_eq!((out[0], out[49], out[50], out.len()), (50, 99, 150, 100));
+        let by_file = read("left_out = { files = [\"b.csv\"] }", 200).unwrap();
+        let all = |trial: &Trial, is_out| trial.left_out.iter().all(|out| *out == is_out);
+        assert!(all(&by_file[0], false) && all(&by_file[1], true));
+    }
+
+    #[test]
+    fn data_and_maps_at_fault_are_refused_by_place() {
+        for (more, rows, expected) in [
+            ("", 100, "100 rows: expected at least 128"),
+            (
+                "left_out = { second_half = false }",
+                200,
+                "holds out no data",
+            ),
+            (
+                "left_out = { files = [\"c.csv\"] }",
+                200,
+                "`left_out.files` names c.csv",
+            ),
+            (
+                "left_out = { files = [\"a.csv\", \"b.csv\"] }",
+                200,
+                "fewer than 64 measured samples",
+            ),
+            (
+                "step = { value = 3.0, unit = \"ms\" }",
+                200,
+                "`step` is contained 3.3333 times",
+            ),
+            (
+                "step = { value = 0.0, unit = \"ms\" }",
+                200,
+                "`step`: 0 s, expected more than 0 s",
+            ),
+            ("step = { value = 1.0, unit = \"m\" }", 200, "`step`:"),
+            ("time = \"clock\"", 200, "clock"),
+        ] {
+            let told = read(more, rows).err().unwrap_or_default();
+            assert!(told.contains(expected), "{more}: {told}");
+        }
+        // A step that is stated needs no column of the time.
+        let own = read("time_step = { value = 20.0, unit = \"ms\" }", 200).unwrap();
+        assert!((own[0].step - 0.02).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_output_that_was_not_measured_can_be_predicted() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = &files(folder.path(), 4)[0];
+        let outputs = [signal("y", "m"), signal("z", "m")].concat();
+        let trial = |needs| {
+            trial(
+                &map(""),
+                Path::new("map.toml"),
+                file,
+                &signal("u", "N"),
+                &outputs,
+                needs,
+            )
+        };
+        let own = trial(&TO_PREDICT).unwrap();
+        assert_eq!(
+            own.in_file[0].as_ref().map(|(unit, _)| unit.as_str()),
+            Some("mm")
+        );
+        assert!(
+            own.in_file[1].is_none() && own.trial.outputs[1].iter().all(|value| value.is_nan())
+        );
+        assert!(trial(&TO_SCORE).is_err());
+    }
 }

@@ -165,3 +165,74 @@ pub(super) fn template(fmu: &Fmu) -> String {
     text += "\n# Other start values of the model, as in a system file: `x0 = 0.01`\n[start]\n";
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made;
+
+    #[test]
+    fn a_template_lists_inputs_outputs_and_parameters() {
+        let variables = made::real(1, "u", "input", r#"start="0" unit="N""#)
+            + &made::real(2, "y", "output", r#"unit="m""#)
+            + &made::real(
+                3,
+                "stiffness",
+                "parameter",
+                r#"variability="fixed" start="5" unit="N/m""#,
+            )
+            + r#"<Boolean name="on" valueReference="4" causality="parameter" variability="fixed" start="true"/>"#
+            + &made::real(
+                5,
+                "constant",
+                "calculatedParameter",
+                r#"variability="fixed""#,
+            );
+        let text = template(&made::fmu("Spring", &variables));
+        expected::compare(env!("CARGO_MANIFEST_DIR"), "map.txt", &text);
+        // What a template gives is a map.
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.toml");
+        std::fs::write(&path, &text).unwrap();
+        let map = Map::read(&path).unwrap();
+        assert_eq!(map.inputs["u"].parts(), ("u", None));
+        assert!(map.parameters.is_empty() && map.start.is_empty());
+        std::fs::write(&path, "[outputs]\n").unwrap();
+        let told = Map::read(&path).unwrap_err().to_string();
+        assert!(told.contains("[outputs] is empty"), "{told}");
+        std::fs::write(
+            &path,
+            "[outputs]\ny = { column = \"force\", unit = \"kN\" }\n",
+        )
+        .unwrap();
+        assert_eq!(
+            Map::read(&path).unwrap().outputs["y"].parts(),
+            ("force", Some("kN"))
+        );
+        std::fs::write(&path, "[outputs]\ny = 3\n").unwrap();
+        let told = Map::read(&path).unwrap_err().to_string();
+        assert!(told.contains("not a map of a model"), "{told}");
+    }
+
+    #[test]
+    fn a_template_lists_the_first_parameters_only() {
+        let fixed = |n: usize| {
+            made::real(
+                n as u32,
+                &format!("p{n}"),
+                "parameter",
+                r#"variability="fixed" start="1""#,
+            )
+        };
+        let text = |count: usize| {
+            let variables: String = (1..=count).map(fixed).collect();
+            template(&made::fmu("Many", &variables))
+        };
+        assert!(!text(LISTED).contains("and others"));
+        let more = text(LISTED + 1);
+        assert!(
+            more.contains("# and others: shakebench info Many.fmu") && !more.contains("\"p61\""),
+            "{more}"
+        );
+    }
+}

@@ -316,3 +316,117 @@ impl Simulator for Alone {
         self.outputs(&outcome, steps)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_needs_a_scale_for_its_drift() {
+        let stated = |plus_minus| Stated {
+            value: None,
+            plus_minus,
+        };
+        assert_eq!(check(2.0, &stated(0.0)), Ok(()));
+        assert_eq!(check(0.0, &stated(0.5)), Ok(()));
+        assert!(check(0.0, &stated(0.0)).unwrap_err().contains("no scale"));
+        for wrong in [-0.5, f64::NAN, f64::INFINITY] {
+            let told = check(2.0, &stated(wrong)).unwrap_err();
+            assert!(told.contains("expected a number, not negative"), "{told}");
+        }
+    }
+
+    #[test]
+    fn a_table_drives_every_input_and_there_is_none_without_one() {
+        let signal = |name: &str| Signal {
+            name: name.into(),
+            unit: String::new(),
+        };
+        assert!(table(&[]).is_none());
+        let own = table(&[signal("u"), signal("v")]).unwrap();
+        assert_eq!(
+            (own.columns, own.values.len(), own.units.len()),
+            (vec!["u".into(), "v".into()], 2, 2)
+        );
+        assert_eq!((&*own.name, own.between), (TABLE, Between::Hold));
+    }
+
+    /// `y = 3 u` at the end of each step.
+    fn alone() -> Alone {
+        use crate::made;
+        let gain = made::real(1, "gain", "parameter", r#"variability="fixed" start="1""#);
+        let fmu = made::computed("Gain", [&["u"], &["y"]], &gain, false, |inputs, outputs| {
+            outputs[0] = 3.0 * inputs[0]
+        });
+        let mut library = FmuLibrary::new(FmiVersion::V3, None);
+        library.give("Gain", fmu.clone());
+        let mut file = SystemFile::default();
+        file.add("own", fmi_system::ComponentFile::new("Gain"));
+        file.own_tables
+            .extend(table(&[signal(fmu.description.variable("u").unwrap())]));
+        file.connect(Origin::output(TABLE, "u"), VariableName::new("own", "u"));
+        let system = assemble(&file, &[], &mut library).unwrap();
+        Alone {
+            parameters: vec![fmu.description.position("gain").unwrap()],
+            system,
+            columns: vec!["own.y".into()],
+            component: "own".into(),
+            file,
+            options: Options::default(),
+            installation: Installation::default(),
+        }
+    }
+
+    #[test]
+    fn a_model_is_simulated_with_its_inputs_held_over_each_step() {
+        let own = alone();
+        let input = [1.0, 2.0, -1.0, 0.5];
+        let found = own.simulate(&[&input], &[(0, 2.0)], 0.1, 4).unwrap();
+        // The output at a sample is that of the step before it.
+        assert_eq!(found, [[0.0, 3.0, 6.0, -3.0]]);
+        let outcome = own.run(&[&input], &[], 0.1, 4).unwrap();
+        assert!(own.outputs(&outcome, 4).is_some());
+        assert!(
+            own.outputs(&outcome, 5).is_none(),
+            "a run that ended before"
+        );
+        let other = Alone {
+            columns: vec!["own.z".into()],
+            ..own.clone()
+        };
+        assert!(other.outputs(&outcome, 4).is_none());
+        assert_eq!(
+            own.isolated(Isolation::All).options.isolation,
+            Isolation::All
+        );
+        assert!(own.notes().is_empty());
+    }
+
+    #[test]
+    fn variables_of_a_map_are_real_and_of_their_kind() {
+        use crate::made;
+        let variables = made::real(1, "u", "input", r#"start="0""#)
+            + &made::real(2, "y", "output", "")
+            + &made::real(3, "p", "parameter", r#"variability="fixed" start="1""#)
+            + r#"<Boolean name="on" valueReference="4" causality="input" start="true"/>"#;
+        let fmu = made::fmu("Own", &variables);
+        let found = |name: &str, causality| real(&fmu, name, causality).map(|own| own.name.clone());
+        assert_eq!(found("u", Causality::Input).as_deref(), Ok("u"));
+        assert_eq!(found("y", Causality::Output).as_deref(), Ok("y"));
+        assert_eq!(found("p", Causality::Parameter).as_deref(), Ok("p"));
+        let told = found("v", Causality::Input).unwrap_err();
+        assert!(told.starts_with("Own has no input `v`"), "{told}");
+        assert!(
+            found("u", Causality::Output)
+                .unwrap_err()
+                .starts_with("Own has no output `u`")
+        );
+        assert!(found("u", Causality::Parameter).is_err());
+        let told = found("on", Causality::Input).unwrap_err();
+        assert!(
+            told.contains("is of the type Boolean: expected Float64 or Float32"),
+            "{told}"
+        );
+        assert!(is_file(Path::new("a.FMU")) && !is_file(Path::new("ShakeTable")));
+    }
+}

@@ -227,3 +227,43 @@ pub(super) fn traces(
     }
     csv.flush()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn signal(name: &str, unit: &str) -> Signal {
+        Signal {
+            name: name.into(),
+            unit: unit.into(),
+        }
+    }
+
+    #[test]
+    fn heads_have_units_that_are_known_and_components_names_of_their_own() {
+        assert_eq!(head(&signal("force", "kN")), "force [kN]");
+        assert_eq!(head(&signal("force", "")), "force");
+        assert_eq!(head(&signal("force", "no unit!")), "force");
+        let mut taken = vec!["a_b_path".to_string()];
+        assert_eq!(component(&signal("a.b", ""), &mut taken), "a_b_path_");
+        assert_eq!(component(&signal("a[b", ""), &mut taken), "a_b_path__");
+        assert_eq!(component(&signal("x1", ""), &mut taken), "x1_path");
+        assert_eq!(taken.len(), 4);
+    }
+
+    #[test]
+    fn a_path_has_the_effects_that_differ_from_none() {
+        let effects = SignalEffects {
+            delay: 0.004,
+            gain: 1.5,
+            ..SignalEffects::NONE
+        };
+        let text = toml::to_string(&path(&effects, 0.002)).unwrap();
+        assert_eq!(
+            text,
+            "fmu = \"SignalPath\"\nperiod = 0.002\n\n[parameters]\ndelay = 0.004\ngain = 1.5\nperiod = 0.002\n"
+        );
+        let none = toml::to_string(&path(&SignalEffects::NONE, 0.002)).unwrap();
+        assert!(none.ends_with("[parameters]\nperiod = 0.002\n"), "{none}");
+    }
+}
