@@ -178,10 +178,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             .collect()
     };
     let (here, there) = (list(&as_described), list(&swapped));
-    // What rivals an effect is told by the part that asks for it.
-    let own = swapped.rivals.iter();
-    let own = own.filter(|(_, against)| !here.contains(against));
-    as_described.rivals.extend(own.cloned());
+    as_described.rivals = rivals([&as_described, &swapped]);
     // Effects that records of a rig cannot tell apart confirm each other.
     let alike = |name: &str, other: &str| {
         let known = |name: &str| measured.index(name);
@@ -509,6 +506,13 @@ fn no_output(description: &Description) -> DescriptionError {
     }
 }
 
+/// Pairs of a rival and the effect that was taken, as told by the first of `parts` that asks for the effect.
+fn rivals([first, second]: [&PartReport; 2]) -> Vec<(String, String)> {
+    let asks = |effect: &str| first.effects.iter().any(|own| own.effect == effect);
+    let more = second.rivals.iter().filter(|(_, against)| !asks(against));
+    first.rivals.iter().chain(more).cloned().collect()
+}
+
 fn part_report<M: InParts>(measured: &M, fitted: Part, selected: &Selected) -> PartReport {
     let (own, tested) = (fitted as usize, fitted.other() as usize);
     // What belongs to a file and not to the rig is fitted there, for every model alike.
@@ -721,16 +725,20 @@ impl RigDiagnosis {
                 };
                 let mut rivals: Vec<String> = Vec::new();
                 for (own, _) in &self.confirmed.effects {
-                    let all: Vec<String> = self.rivals_of(own).map(str::to_owned).collect();
+                    let is_shown =
+                        |rival: &str| self.instead_of(own).any(|(shown, _)| shown == rival);
+                    let all = self.rivals_of(own).filter(|rival| !is_shown(rival));
+                    let all: Vec<&str> = all.collect();
                     if !all.is_empty() {
                         rivals.push(format!("{} instead of {own}", all.join(" or ")));
                     }
                 }
-                format!(
-                    "{name}: {causes}{}, and {} explains it nearly as well; {falls}.",
-                    shown.join(" and "),
-                    joined(&rivals).replace('_', " ")
-                )
+                let nearly = match rivals.as_slice() {
+                    [] => String::new(),
+                    some => format!(", and {} explains it nearly as well", joined(some)),
+                };
+                let nearly = nearly.replace('_', " ");
+                format!("{name}: {causes}{}{nearly}; {falls}.", shown.join(" and "))
             }
             Verdict::Unexplained if part.effects.is_empty() && self.swapped.effects.is_empty() => {
                 format!(
@@ -766,7 +774,44 @@ impl RigDiagnosis {
 
 #[cfg(test)]
 mod tests {
-    use super::confidence;
+    use super::{PartEffect, PartReport, Point, confidence, rivals};
+
+    fn part(effects: &[&str], rivals: &[(&str, &str)]) -> PartReport {
+        let effect = |name: &&str| PartEffect {
+            effect: (*name).into(),
+            parameters: Vec::new(),
+            confidence: 1.0,
+            share: 0.1,
+            objection: None,
+        };
+        let rivals = rivals.iter();
+        PartReport {
+            nominal_error: 0.1,
+            refitted_error: 0.1,
+            extended_error: 0.01,
+            fitted_error: 0.01,
+            gain_interval: (0.9, 1.0),
+            parameters: Vec::new(),
+            effects: effects.iter().map(effect).collect(),
+            explained: 0.9,
+            rivals: rivals.map(|(a, b)| ((*a).into(), (*b).into())).collect(),
+            point: Point::default(),
+        }
+    }
+
+    #[test]
+    fn the_first_part_that_asks_for_an_effect_tells_its_rivals() {
+        let first = part(&["delay"], &[("valve_lag", "delay")]);
+        let second = part(
+            &["delay", "free_play"],
+            &[("friction", "free_play"), ("dead_band", "delay")],
+        );
+        let pairs = |parts| rivals(parts).into_iter();
+        let names: Vec<String> = pairs([&first, &second]).map(|(rival, _)| rival).collect();
+        assert_eq!(names, ["valve_lag", "friction"]);
+        let names: Vec<String> = pairs([&second, &first]).map(|(rival, _)| rival).collect();
+        assert_eq!(names, ["friction", "dead_band"]);
+    }
 
     /// Quantiles of Student's distribution with four degrees of freedom, from printed tables.
     #[test]
