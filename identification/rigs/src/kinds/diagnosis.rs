@@ -427,7 +427,11 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             }
             let is_open = as_stated.is_some();
             let best = as_stated.unwrap_or_else(|| confirmed.point.clone());
-            let errors = Crossed::of(&own, &best)?;
+            let looked = Crossed::looked(&own, &best)?;
+            if !is_open && crossed.is_far_from(&looked) {
+                return Some((own, best, looked, true));
+            }
+            let errors = looked.settled(&own)?;
             let is_needed = !is_open && crossed.needs(&errors);
             Some((own, best, errors, is_needed))
         });

@@ -5,10 +5,12 @@ use rayon::prelude::*;
 use super::confirmed::{clearly_better, lengths};
 use super::parts::{EVERYTHING, InParts};
 use super::readings::NEEDED;
-use diagnosis::{Point, all_errors, settled, squares};
+use diagnosis::{Point, all_errors, looked, settled, squares};
 
 /// Share of the errors' power that is not white noise from which on a model is not exact.
 const INEXACT: f64 = 0.5;
+/// Growth of the squared error in a few steps of a fit beyond which more of them change nothing.
+const FAR: f64 = 3.0;
 /// Values that are tried to either side.
 const TRIES: usize = 4;
 /// Share of a distance to which its end is found.
@@ -147,12 +149,19 @@ impl<M: InParts> Profiled<'_, M> {
     /// Growth of the squared error with parameter `i` at `value`, whether it tells against that, and the best fit.
     fn fitted(&self, (i, value): (usize, f64), starts: &[Point]) -> Option<(f64, bool, Point)> {
         let held = self.measured.pinned(i, value)?;
-        let fits = starts.par_iter().filter_map(|start| {
-            let best = settled(&held, start, EVERYTHING)?;
+        let grown = |best: Point| {
             let errors = all_errors(&held, &best, EVERYTHING);
-            Some((squares(&errors) / squares(&self.errors), errors, best))
-        });
-        let (growth, errors, best) = fits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+            (squares(&errors) / squares(&self.errors), errors, best)
+        };
+        // Of several ways to the same end the one that is ahead is walked to it.
+        let near = starts.par_iter();
+        let near = near.filter_map(|start| looked(&held, start, EVERYTHING).map(grown));
+        let near = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (growth, errors, best) = if near.0 > FAR {
+            near
+        } else {
+            grown(settled(&held, &near.2, EVERYTHING)?)
+        };
         let is_told = growth > self.allowed && clearly_better(&errors, &self.errors, &self.lengths);
         Some((growth, is_told, best))
     }

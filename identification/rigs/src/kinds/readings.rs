@@ -83,7 +83,7 @@ impl Crossed {
             fit(model, starts[1], tested[0] as usize)?,
         ];
         let errors = |i: usize| {
-            let all = || settled(model, start, EVERYTHING);
+            let all = || fit(model, start, EVERYTHING);
             let used = on_the_other(model, all, &points[i], tested[1 - i]);
             all_errors(model, &used, tested[i] as usize)
         };
