@@ -501,7 +501,7 @@ pub(super) fn confirm<M: InParts>(
     };
     let (here, there) = (on(Part::Fitted), on(Part::LeftOut));
     for (part, used) in [(Part::Fitted, &here), (Part::LeftOut, &there)] {
-        if used == point {
+        if used == point && fits.parts[part as usize].0 != *point {
             findings.push(format!(
                 "the fit to `{}` alone loses the other part; the model of all data, which serves it about as well, \
                  takes its place",
