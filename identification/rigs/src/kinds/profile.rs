@@ -4,13 +4,11 @@ use rayon::prelude::*;
 
 use super::confirmed::{clearly_better, lengths};
 use super::parts::{EVERYTHING, InParts};
-use super::readings::NEEDED;
+use super::readings::{FAR, NEEDED};
 use diagnosis::{Point, all_errors, looked, settled, squares};
 
 /// Share of the errors' power that is not white noise from which on a model is not exact.
 const INEXACT: f64 = 0.5;
-/// Growth of the squared error in a few steps of a fit beyond which more of them change nothing.
-const FAR: f64 = 3.0;
 /// Values that are tried to either side.
 const TRIES: usize = 4;
 /// Share of a distance to which its end is found.

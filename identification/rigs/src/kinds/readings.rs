@@ -20,8 +20,8 @@ const BETTER: f64 = 0.95;
 /// both parts makes a reading less likely by a factor of e, however many samples show it.
 const MOST: f64 = 5.0;
 
-/// Growth of the squared error in either part after a few steps of a fit beyond which more of them change nothing.
-const FAR: f64 = 3.0;
+/// Growth of the squared error in a few steps of a fit beyond which more of them change nothing.
+pub(super) const FAR: f64 = 3.0;
 
 /// Least weight that is told in the sentence.
 const TOLD: f64 = 0.05;
