@@ -194,6 +194,16 @@ fn the_press_has_delay_and_unequal_areas() {
 
 #[needs::shared("measured")]
 #[test]
+#[ignore = "0.0054 apart: one part has bristles beside it, and either knows it to 0.010"]
+fn open_the_parts_of_the_press_have_one_asymmetry() {
+    let report = report("servohydraulic_press");
+    let a = value(&report.as_described, "asymmetric_gain", "asymmetry");
+    let b = value(&report.swapped, "asymmetric_gain", "asymmetry");
+    assert!((a - b).abs() < 0.005, "{a} {b}");
+}
+
+#[needs::shared("measured")]
+#[test]
 #[ignore = "minutes"]
 fn the_damper_has_asymmetric_friction_free_play_and_a_memory() {
     let three = report("friction_damper");
