@@ -20,7 +20,7 @@ use super::model::Point;
 use super::opening::opened;
 use super::progress::{Observer, Progress, Step};
 use super::resampling::correlation_time;
-use super::search::{Selection, search};
+use super::search::{Found, Selection, resumed, search};
 
 /// Standard deviations by which the likelihood of unseen data must rise. A dozen candidates are
 /// tried, so that one in a thousand times would be chance.
@@ -35,6 +35,8 @@ const RIVAL: f64 = 0.9;
 const WORTH_TESTING: f64 = 0.7;
 /// Effects in one model.
 const MOST_EFFECTS: usize = 8;
+/// Effects, the weakest first, in whose place others are searched.
+const EXCHANGED: usize = 2;
 /// Candidates that are fitted to the end in a round.
 const FINALISTS: usize = 6;
 /// Starts of the nominal model beside the stated values, and how far they lie from these, in stated
@@ -289,6 +291,8 @@ struct CrossValidation<'a, M: SimulatedModel> {
     /// Deviates and reduced models of the last look backward.
     deviates: Vec<f64>,
     without: Vec<Simulated>,
+    /// The effect that is not tried.
+    barred: Option<usize>,
 }
 
 impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
@@ -300,6 +304,7 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             rivals: Vec::new(),
             deviates: Vec::new(),
             without: Vec::new(),
+            barred: None,
         }
     }
 
@@ -316,6 +321,49 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         }
         let named = !current.point.effects.is_empty() && !self.is_at_bound(&current.point);
         named.then_some(current)
+    }
+
+    /// A model that a search ends with that goes on from `found`, or from it without one of its effects, if that pays
+    /// as an effect must: what was taken while others were missing may stand in for them.
+    fn exchanged(&mut self, found: &Simulated) -> Option<Simulated> {
+        let mut best = found.clone();
+        let mut is_other = false;
+        let mut tried = BTreeSet::new();
+        'better: while best.point.effects.len() > 1 && !self.observer.is_over() {
+            self.reduced(&best)?;
+            let without = std::mem::take(&mut self.without).into_iter();
+            let own = best.point.effects.iter().map(|(i, _)| Some(*i));
+            let mut starts: Vec<(Option<usize>, Simulated)> = own.zip(without).collect();
+            starts.sort_by(|a, b| a.1.squares.total_cmp(&b.1.squares));
+            starts.truncate(EXCHANGED);
+            starts.insert(0, (None, best.clone()));
+            for (gone, start) in starts {
+                if gone.is_some_and(|gone| !tried.insert(gone)) {
+                    continue;
+                }
+                self.barred = gone;
+                let other = self.ended_from(start);
+                self.barred = None;
+                if let Some(other) = other
+                    && compare(&self.crossed(&best)?, &self.crossed(&other)?).holds()
+                {
+                    (best, is_other) = (other, true);
+                    continue 'better;
+                }
+            }
+            break;
+        }
+        is_other.then_some(best)
+    }
+
+    /// What a search from `start` ends with.
+    fn ended_from(&mut self, start: Simulated) -> Option<Simulated> {
+        let begun = Found {
+            nominal: start.clone(),
+            best: Some(start),
+            others: Vec::new(),
+        };
+        resumed(self, begun)?.best
     }
 
     /// Whether `one` predicts each fold from the other better than `two` does.
@@ -453,7 +501,8 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
     }
 
     fn extensions(&mut self, current: &Simulated, _: &[Simulated]) -> Option<Vec<Simulated>> {
-        let all: Vec<usize> = (0..self.model.candidates().len()).collect();
+        let all = 0..self.model.candidates().len();
+        let all: Vec<usize> = all.filter(|i| self.barred != Some(*i)).collect();
         let mut fitted = self.fitted(current, &all)?;
         // What stands at its bound is never named, and stands in for something else.
         fitted.retain(|(_, one)| !self.is_at_bound(&one.point));
@@ -577,13 +626,14 @@ pub fn select<M: SimulatedModel>(
 
 /// The best of `proposals`, each a set of effects and a point to begin from. Each is fitted to all of `record`;
 /// the best is the one whose halves predict each other best, without the effects that do not pay there. If none
-/// can be fitted to the halves, it is the nominal model; none if that one cannot be fitted either.
+/// can be fitted to the halves, it is the nominal model; none if that one cannot be fitted either. Beside it a better one
+/// with others of its effects, if a search finds one from there.
 pub fn select_jointly<M: SimulatedModel>(
     model: &M,
     proposals: &[Point],
     record: usize,
     observer: Observer<'_>,
-) -> Option<Simulated> {
+) -> Option<(Simulated, Option<Simulated>)> {
     let mut selection = CrossValidation::new(model, record, observer);
     let effects = |point: &Point| -> BTreeSet<usize> {
         let all = point.effects.iter();
@@ -613,7 +663,7 @@ pub fn select_jointly<M: SimulatedModel>(
         (!left.is_nan()).then_some((left, fitted))
     });
     let Some((_, mut best)) = fitted.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-        return nominal(model, record);
+        return nominal(model, record).map(|found| (found, None));
     };
     while !best.point.effects.is_empty() {
         match selection.reduced(&best) {
@@ -621,7 +671,8 @@ pub fn select_jointly<M: SimulatedModel>(
             _ => break,
         }
     }
-    Some(best)
+    let other = model.is_cheap().then(|| selection.exchanged(&best));
+    Some((best, other.flatten()))
 }
 
 #[cfg(test)]
@@ -705,7 +756,8 @@ mod tests {
             effects: Vec::new(),
         };
         for starts in [[5.4, 0.2], [0.2, 5.4]] {
-            let found = select_jointly(&model, &starts.map(begun), 0, Observer::none()).unwrap();
+            let (found, _) =
+                select_jointly(&model, &starts.map(begun), 0, Observer::none()).unwrap();
             assert!(
                 (found.point.nuisance[0].abs() - 0.3).abs() < 1e-3,
                 "{found:?}"
@@ -819,8 +871,111 @@ mod tests {
             compare(&bare, &with).gain < -1.0,
             "the halves tell the effect"
         );
-        let found = select_jointly(&model, &[start], 2, Observer::none()).unwrap();
+        let (found, _) = select_jointly(&model, &[start], 2, Observer::none()).unwrap();
         let size = found.point.effects.first().map(|(_, q)| q[0]);
         assert!((size.unwrap() - 1.0).abs() < 0.05, "{found:?}");
+    }
+
+    /// A sum of three waves, for which a fourth one, like two of them together, is taken first.
+    struct Waves {
+        candidates: Vec<Candidate>,
+    }
+
+    impl Waves {
+        const STANDS_IN: usize = 2;
+
+        fn new() -> Self {
+            let wave = |effect| Candidate {
+                effect,
+                parameters: vec![EffectParameter {
+                    name: "size",
+                    unit: "1",
+                    scale: Scale::Linear(1.0),
+                    role: Role::Size { weak: 0.1 },
+                    bounds: (-50.0, 50.0),
+                }],
+                starts: vec![vec![0.5]],
+                look_alikes: &[],
+                tolerance: 1.0,
+                contains: None,
+                law: "",
+                is_linear: true,
+            };
+            let candidates = ["first", "second", "like_both", "other"].map(wave).to_vec();
+            Self { candidates }
+        }
+
+        fn at(k: usize) -> [f64; 4] {
+            let t = k as f64 / 10.0;
+            let [first, second, other, apart] =
+                [1.0, 1.9, 3.1, 4.3].map(|frequency| (frequency * t + frequency).sin());
+            [first, second, first + second + 0.3 * apart, other]
+        }
+    }
+
+    impl SimulatedModel for Waves {
+        fn nuisance(&self) -> usize {
+            1
+        }
+        fn candidates(&self) -> &[Candidate] {
+            &self.candidates
+        }
+        fn blocks(&self) -> usize {
+            1
+        }
+        fn block_of(&self, _: usize) -> Option<usize> {
+            None
+        }
+        fn samples(&self, record: usize, _: usize) -> usize {
+            if record == 2 { 2 * SAMPLES } else { SAMPLES }
+        }
+        fn errors(&self, point: &Point, record: usize, _: usize) -> Vec<f64> {
+            let own = match record {
+                2 => 0..2 * SAMPLES,
+                half => half * SAMPLES..(half + 1) * SAMPLES,
+            };
+            own.map(|k| {
+                let waves = Self::at(k);
+                let found = point.effects.iter().map(|(i, q)| q[0] * waves[*i]);
+                let noise = 1e-3 * (37.0 * k as f64).sin();
+                waves[0] + waves[1] + waves[3] + noise - point.nuisance[0] - found.sum::<f64>()
+            })
+            .collect()
+        }
+        fn folds(&self, _: usize) -> [usize; 2] {
+            [0, 1]
+        }
+        fn screen(&self, record: usize) -> usize {
+            record
+        }
+        fn held(&self) -> Self {
+            Self {
+                candidates: self.candidates.clone(),
+            }
+        }
+        fn record_name(&self, _: usize) -> &str {
+            "waves"
+        }
+    }
+
+    #[test]
+    fn what_stands_in_for_two_effects_goes_where_both_of_them_do_better() {
+        let model = Waves::new();
+        let start = Point {
+            nuisance: vec![0.0],
+            effects: vec![(Waves::STANDS_IN, vec![0.9]), (3, vec![0.9])],
+        };
+        let (_, found) = select_jointly(&model, &[start], 2, Observer::none()).unwrap();
+        let found = found.unwrap();
+        let mut effects: Vec<usize> = found.point.effects.iter().map(|(i, _)| *i).collect();
+        effects.sort_unstable();
+        assert_eq!(effects, [0, 1, 3], "{found:?}");
+        assert!(
+            found
+                .point
+                .effects
+                .iter()
+                .all(|(_, q)| (q[0] - 1.0).abs() < 0.01)
+        );
     }
 }

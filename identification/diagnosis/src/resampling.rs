@@ -1,6 +1,6 @@
 //! Intervals and significance by resampling blocks, so that samples may be correlated.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -59,8 +59,10 @@ pub fn scattered(inverse: &DMatrix<f64>, columns: &[&[f64]], errors: &[f64]) -> 
     inverse * scatter * inverse
 }
 
+/// Of as many values as both have.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let n = a.len().min(b.len());
+    DVectorView::from_slice(&a[..n], n).dot(&DVectorView::from_slice(&b[..n], n))
 }
 
 /// 95 % interval of `1 - (sum of after²) / (sum of before²)` by circular block bootstrap (Politis

@@ -174,12 +174,14 @@ fn ask(
     Ok(json)
 }
 
+fn has_word(added: Added, name: &Value) -> bool {
+    let name = name.as_str().unwrap_or_default();
+    added.words().iter().any(|word| name.contains(word))
+}
+
 /// Every value of an effect or a found parameter whose name says it, with its standard error, in `unit`.
 fn said(json: &Value, added: Added, unit: &str) -> Vec<(f64, f64)> {
-    let has_word = |name: &Value| {
-        let name = name.as_str().unwrap_or_default();
-        added.words().iter().any(|word| name.contains(word))
-    };
+    let has_word = |name: &Value| has_word(added, name);
     let number =
         |p: &Value, key: &str| units::convert(p[key].as_f64()?, p["unit"].as_str()?, unit).ok();
     let effects = json["effects"]
@@ -204,6 +206,22 @@ fn said(json: &Value, added: Added, unit: &str) -> Vec<(f64, f64)> {
         ))
     });
     values.chain(found).collect()
+}
+
+/// What the record has of its own, with its standard error: as said, or else as fitted, since what is too small to be
+/// said is in the record all the same.
+fn own(json: &Value, added: Added, unit: &str) -> (f64, f64) {
+    let fitted = || {
+        let parameters = json["rig"]["confirmed"]["parameters"].as_array()?;
+        let of =
+            |p: &Value, key: &str| units::convert(p[key].as_f64()?, p["unit"].as_str()?, unit).ok();
+        parameters
+            .iter()
+            .filter(|p| has_word(added, &p["name"]))
+            .find_map(|p| Some((of(p, "value")?, of(p, "standard_error")?)))
+    };
+    let said = said(json, added, unit);
+    said.first().copied().or_else(fitted).unwrap_or_default()
 }
 
 fn names(json: &Value) -> BTreeSet<String> {
@@ -248,8 +266,7 @@ fn run() -> Result<(), String> {
         );
         let (size, unit) = added.size();
         let unit = unit.unwrap_or(rig.unit);
-        let (earlier, later) = (said(before, added, unit), said(&after, added, unit));
-        let already = earlier.first().copied().unwrap_or((0.0, 0.0));
+        let (already, later) = (own(before, added, unit), said(&after, added, unit));
         let is_said = later.iter().any(|value| *value != already);
         let is_held = later.iter().any(|(value, error)| {
             (value - already.0 - size).abs() <= 1.96 * error.hypot(already.1)

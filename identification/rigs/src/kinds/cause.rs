@@ -91,6 +91,10 @@ impl Cause {
                 let way = if by > 0.0 { "high" } else { "low" };
                 format!("the displacement reads {} too {way}", size(unit))
             }
+            "load_cell_zero" => {
+                let way = if by > 0.0 { "high" } else { "low" };
+                format!("the load cell reads {} too {way}", size(unit))
+            }
             "position_zero" => {
                 let way = if by > 0.0 { "high" } else { "low" };
                 format!("the recorded position is {} too {way}", size(unit))
@@ -182,6 +186,7 @@ pub(super) fn measure(value: f64, standard_error: f64, unit: &str) -> String {
     let (unit, factor) = match unit {
         "m" => ("mm", 1e3),
         "s" => ("ms", 1e3),
+        "Pa" => ("MPa", 1e-6),
         "1" => ("", 1.0),
         other => (other, 1.0),
     };

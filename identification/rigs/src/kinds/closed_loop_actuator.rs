@@ -239,7 +239,7 @@ impl Equations for ClosedLoopActuator {
             .iter()
             .map(RigRecording::period)
             .fold(0.0, f64::max);
-        let folded = CALIBRATED * (slowest * ENOUGH).max(1.0).powi(3);
+        let folded = CALIBRATED * (slowest * ENOUGH).max(1.0).powi(2);
         let scale = accelerometer_scale(recordings, COMMAND).map(|own| NamedValue {
             standard_error: own.standard_error.hypot(folded / INTERVAL_95),
             ..own

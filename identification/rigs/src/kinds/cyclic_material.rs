@@ -42,6 +42,8 @@ nominal_parameters! {
     strain_amplitude: "1" = 0.0,
     /// Share of its speed that the strain keeps where it turns; 0 where no turn lies between samples.
     turn_speed: "1" = 0.0,
+    /// What the load cell reads without a force, as a stress.
+    load_cell_zero: "Pa" = 0.0,
 }
 
 effects! {
@@ -105,6 +107,9 @@ impl Equations for CyclicMaterial {
     const OUTPUT: Channel = STRESS;
     const IS_HYSTERETIC: bool = true;
     const IS_PATH: bool = true;
+    const SAID_BY: &'static [(&'static str, &'static str)] =
+        &[("load_cell_zero", "load_cell_zero")];
+    const CAUSES: &'static [&'static str] = &["load_cell_zero"];
 
     fn simulate(
         &self,
@@ -121,6 +126,7 @@ impl Equations for CyclicMaterial {
             recovery,
             strain_amplitude: amplitude,
             turn_speed,
+            load_cell_zero: stated_zero,
         } = *nominal;
         let Effects {
             second_backstress: second,
@@ -221,7 +227,7 @@ impl Equations for CyclicMaterial {
             }
         }
         for stress in out.iter_mut() {
-            *stress += zero;
+            *stress += stated_zero + zero;
         }
     }
 }

@@ -35,6 +35,8 @@ const DOUBTED: &str = "the prediction of either part is hardly worse without it"
 const UNUSED: &str = "the prediction of the other part is better without it";
 /// Error on all data over that of a model with more nominal parameters, up to which it does as well.
 const AS_WELL: f64 = 1.02;
+/// Error of a model, over the output, that leaves nothing to doubt in how the output is measured.
+const SMALL: f64 = 0.05;
 /// Share of the described model's squared error that is nothing to explain.
 const NOTHING: f64 = 1e-3;
 /// Share of the squared error beyond which what is explained is all of it.
@@ -187,12 +189,45 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     };
     let in_both = |name: &String, others: &[String]| others.iter().any(|other| alike(name, other));
     // Either part proposes; all data together decide by how either part predicts the other.
-    let mut start = select_jointly(
+    let (found, other) = select_jointly(
         measured,
         &proposals(measured, [&as_described, &swapped]),
         EVERYTHING,
         observer,
     )?;
+    let nominal = NominalFits::of(measured);
+    // What a part gives a reason against is not named, unless the other part names it without one.
+    let both = || as_described.effects.iter().chain(&swapped.effects);
+    let judged = |point: &Point| {
+        let (mut refused, mut findings): (Vec<Refused>, _) = (Vec::new(), Vec::new());
+        let mut left = point.clone();
+        for effect in both() {
+            let (Some(index), Some(reason)) = (measured.index(&effect.effect), &effect.objection)
+            else {
+                continue;
+            };
+            if both().any(|own| own.effect == effect.effect && own.objection.is_none()) {
+                continue;
+            }
+            // A part without it is predicted by a fit that bends to make up for it, and may be so by chance.
+            if reason == UNUSED && is_vital(measured, &left, index) {
+                continue;
+            }
+            left.effects.retain(|(known, _)| *known != index);
+            if refused.iter().all(|(known, _)| *known != index) {
+                refused.push((index, reason.clone()));
+            }
+        }
+        let confirmed = confirm(measured, &nominal, &left, &mut refused, &mut findings)?;
+        Some((confirmed, refused, findings))
+    };
+    let stands_whole =
+        |point: &Point| judged(point).filter(|own| own.0.effects.len() == point.effects.len());
+    let other = other.and_then(|other| Some((stands_whole(&other.point)?, other)));
+    let ((mut confirmed, mut refused, mut findings), start) = match other {
+        Some(other) => other,
+        None => (judged(&found.point)?, found),
+    };
     let mut set_aside: Vec<SetAside> = Vec::new();
     let mut not_confirmed: Vec<String> = Vec::new();
     let kept: Vec<String> = start
@@ -217,35 +252,6 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             reason: reason.to_owned(),
         });
     }
-    // What a part gives a reason against is not named, unless the other part names it without one.
-    let mut refused: Vec<Refused> = Vec::new();
-    let both = || as_described.effects.iter().chain(&swapped.effects);
-    for effect in both() {
-        let (Some(index), Some(reason)) = (measured.index(&effect.effect), &effect.objection)
-        else {
-            continue;
-        };
-        if both().any(|own| own.effect == effect.effect && own.objection.is_none()) {
-            continue;
-        }
-        // A part without it is predicted by a fit that bends to make up for it, and may be so by chance.
-        if reason == UNUSED && is_vital(measured, &start.point, index) {
-            continue;
-        }
-        start.point.effects.retain(|(known, _)| *known != index);
-        if refused.iter().all(|(known, _)| *known != index) {
-            refused.push((index, reason.clone()));
-        }
-    }
-    let mut findings = Vec::new();
-    let nominal = NominalFits::of(measured);
-    let mut confirmed = confirm(
-        measured,
-        &nominal,
-        &start.point,
-        &mut refused,
-        &mut findings,
-    )?;
     let crossed = Crossed::of(measured, &confirmed.point)?;
     let mut of_its_class = of_its_class(measured, &confirmed.point, crossed, observer).into_iter();
     let (best, mut crossed) = of_its_class.next()?;
@@ -369,6 +375,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let holds = tests
         .into_iter()
         .all(|(error, fitted)| agrees(error, fitted));
+    let leaves_little = tests.into_iter().all(|(error, _)| error < SMALL);
     // Where they do not agree so well, since friction or the like is missed, what either part predicts of
     // the other still shows a zero or a delay that is far from what was stated in both.
     let explains = [
@@ -445,7 +452,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     causes.extend(measured.contradictions().into_iter().filter(|cause| {
         // Of records that no model explains, sensors tell less too.
-        holds || explains || cause.deviations() > FAR
+        holds || explains || leaves_little || cause.deviations() > FAR
     }));
     let readings = readings(measured, weighed, &causes, &doubted, (&confirmed, crossed));
     let of_parts = [&as_described, &swapped].into_iter();
@@ -703,6 +710,19 @@ impl RigDiagnosis {
             Verdict::Named => {
                 let mut all = self.causes_in_words();
                 all.extend(shown);
+                let is_modelled = |own: &Cause| {
+                    let mut parameters = self.confirmed.parameters.iter();
+                    parameters.any(|p| p.name == own.found.name)
+                };
+                if self.confirmed.effects.is_empty() && !self.causes.iter().any(is_modelled) {
+                    return format!(
+                        "{name}: {}; the refitted model does not depend on it, and its error of {} on the held-out \
+                         data is {:.1} %.",
+                        joined(&all),
+                        self.output,
+                        100.0 * self.confirmed.error
+                    );
+                }
                 let left = 1.0 - self.unexplained;
                 let count = self.causes.len() + self.confirmed.effects.len();
                 let share = match (count, left > ALL) {

@@ -33,7 +33,7 @@ const SECOND_INNER_FORCE: Channel = Channel::Other {
     unit: "N",
 };
 
-/// A device whose first force is less than this share of its friction is in its gap.
+/// A device whose first force is less than this share of its friction is in its gap, and from twice as much it is not.
 const HELD: f64 = 0.05;
 
 /// Greatest asymmetry: one side holds a twentieth.
@@ -44,6 +44,8 @@ nominal_parameters! {
     coulomb_force: "N",
     /// k: of the device before it slides.
     stiffness: "N/m",
+    /// What the load cell reads without a force.
+    load_cell_zero: "N" = 0.0,
 }
 
 session_parameters! {
@@ -141,6 +143,9 @@ impl Equations for HystereticDevice {
     const OUTPUT: Channel = FORCE;
     const IS_HYSTERETIC: bool = true;
     const IS_SCALED: bool = true;
+    const SAID_BY: &'static [(&'static str, &'static str)] =
+        &[("load_cell_zero", "load_cell_zero")];
+    const CAUSES: &'static [&'static str] = &["load_cell_zero"];
 
     fn natural(nominal: &Nominal, channels: Natural) -> Natural {
         Natural {
@@ -160,6 +165,7 @@ impl Equations for HystereticDevice {
         let Nominal {
             coulomb_force: coulomb,
             stiffness,
+            load_cell_zero: stated_zero,
         } = *nominal;
         let Effects {
             asymmetric_coulomb_friction: AsymmetricCoulombFriction { asymmetry },
@@ -195,6 +201,7 @@ impl Equations for HystereticDevice {
             delay: Delay { delay },
             load_cell_zero: LoadCellZero { zero },
         } = *effects;
+        let zero = stated_zero + zero;
         let inner = [
             (first_lever, recording.input(FIRST_INNER_FORCE)),
             (second_lever, recording.input(SECOND_INNER_FORCE)),
@@ -203,20 +210,15 @@ impl Equations for HystereticDevice {
             recording.input(Channel::Displacement),
             recording.input(Channel::Velocity),
         );
-        // The device begins as it was left: under the first measured force, or somewhere in the gap.
+        // The device begins as it was left: under the first measured force, or somewhere in the gap. Between, it begins
+        // between, so that no fit of a zero ends where one becomes the other.
         let first = recording.output().first().copied().unwrap_or(f64::NAN) - zero;
-        let is_held = first.abs() > HELD * coulomb;
-        let mut force = if is_held {
-            first.max(-coulomb).min(coulomb)
-        } else {
-            0.0
-        };
+        let held = ((first.abs() / (HELD * coulomb)).max(1.0) - 1.0).min(1.0);
+        let mut force = held * first.max(-coulomb).min(coulomb);
         // Travelled part of the gap, 0 at its negative end.
-        let mut travelled = if is_held {
-            if force > 0.0 { gap } else { 0.0 }
-        } else {
-            gap * (0.5 + session.gap_travelled).clamp(0.0, 1.0)
-        };
+        let left = (0.5 + session.gap_travelled).clamp(0.0, 1.0);
+        let end = if first > 0.0 { 1.0 } else { 0.0 };
+        let mut travelled = gap * (held * end + (1.0 - held) * left);
         let (mut shown, mut shown_rate) = (force, 0.0);
         // Twelve steps a radian of the load path at least, sixty-four a sample at most.
         let radians = resonance * recording.period();
