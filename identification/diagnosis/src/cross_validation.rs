@@ -323,8 +323,8 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         named.then_some(current)
     }
 
-    /// A model that a search ends with that goes on from `found`, or from it without one of its effects, if that pays
-    /// as an effect must: what was taken while others were missing may stand in for them.
+    /// The end of a search that begins from `found`, or from it without one of its effects, if it pays as an effect
+    /// must: what was taken while others were missing may replace them.
     fn exchanged(&mut self, found: &Simulated) -> Option<Simulated> {
         let mut best = found.clone();
         let mut is_other = false;
@@ -882,7 +882,7 @@ mod tests {
     }
 
     impl Waves {
-        const STANDS_IN: usize = 2;
+        const LIKE_BOTH: usize = 2;
 
         fn new() -> Self {
             let wave = |effect| Candidate {
@@ -959,11 +959,11 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_in_for_two_effects_goes_where_both_of_them_do_better() {
+    fn what_replaced_two_effects_goes_where_both_of_them_do_better() {
         let model = Waves::new();
         let start = Point {
             nuisance: vec![0.0],
-            effects: vec![(Waves::STANDS_IN, vec![0.9]), (3, vec![0.9])],
+            effects: vec![(Waves::LIKE_BOTH, vec![0.9]), (3, vec![0.9])],
         };
         let (_, found) = select_jointly(&model, &[start], 2, Observer::none()).unwrap();
         let found = found.unwrap();

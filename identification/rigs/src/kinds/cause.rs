@@ -284,6 +284,16 @@ mod tests {
         );
         assert_eq!(cause(found("scale", 1.015, 1e-3, "1"), (1.0, 0.01)), None);
         assert_eq!(cause(found("scale", 1.05, 0.03, "1"), (1.0, 0.01)), None);
+        let high = found("load_cell_zero", 33e6, 1.4e6, "Pa");
+        assert_eq!(
+            cause(high, (0.0, 2e6)).as_deref(),
+            Some("the load cell reads 33 ± 3 MPa too high")
+        );
+        let low = found("load_cell_zero", -1031.0, 150.0, "N");
+        assert_eq!(
+            cause(low, (0.0, 100.0)).as_deref(),
+            Some("the load cell reads 1031 ± 294 N too low")
+        );
         let offset = found("offset", -1.2e-3, 1e-4, "m");
         assert_eq!(
             cause(offset, (0.0, 1e-4)).as_deref(),

@@ -331,10 +331,10 @@ mod tests {
             frame_compliance: FrameCompliance { compliance },
             ..Effects::off().unwrap()
         };
-        stress_with(strain, amplitude, effects)
+        stress_with(strain, amplitude, effects, 0.0)
     }
 
-    fn stress_with(strain: &[f64], amplitude: f64, effects: Effects) -> Vec<f64> {
+    fn stress_with(strain: &[f64], amplitude: f64, effects: Effects, zero: f64) -> Vec<f64> {
         let channels = vec![(STRAIN, strain.to_vec()), (STRESS, vec![0.0; strain.len()])];
         let recording = Recording::new("path", 1.0, channels).unwrap();
         let recording = RigRecording::new(recording, CyclicMaterial::INPUTS, STRESS);
@@ -346,6 +346,7 @@ mod tests {
             recovery: 1.0,
             strain_amplitude: amplitude,
             turn_speed: 0.0,
+            load_cell_zero: zero,
         };
         let mut out = vec![0.0; strain.len()];
         CyclicMaterial.simulate(&recording, &nominal, &effects, &(), &mut out);
@@ -367,14 +368,18 @@ mod tests {
 
     #[test]
     fn a_load_cell_s_zero_is_in_every_reading_and_yields_nothing() {
-        let effects = Effects {
-            load_cell_zero: LoadCellZero { zero: -3e7 },
-            ..Effects::off().unwrap()
-        };
-        // Elastic, at yield, and back without a strain.
-        let out = stress_with(&[0.0, 0.001, 0.01, 0.0], 0.0, effects);
-        for (found, expected) in out.into_iter().zip([-3e7, 1.7e8, 3.7e8, -4.3e8]) {
-            assert!((found - expected).abs() < 1.0, "{found} {expected}");
+        for stated in [0.0, -3e7, 1e7] {
+            let effects = Effects {
+                load_cell_zero: LoadCellZero {
+                    zero: -3e7 - stated,
+                },
+                ..Effects::off().unwrap()
+            };
+            // Elastic, at yield, and back without a strain.
+            let out = stress_with(&[0.0, 0.001, 0.01, 0.0], 0.0, effects, stated);
+            for (found, expected) in out.into_iter().zip([-3e7, 1.7e8, 3.7e8, -4.3e8]) {
+                assert!((found - expected).abs() < 1.0, "{found} {expected}");
+            }
         }
     }
 

@@ -33,7 +33,7 @@ const SECOND_INNER_FORCE: Channel = Channel::Other {
     unit: "N",
 };
 
-/// A device whose first force is less than this share of its friction is in its gap, and from twice as much it is not.
+/// A device whose first force is less than this share of its friction is in its gap; from three times as much it is held.
 const HELD: f64 = 0.05;
 
 /// Greatest asymmetry: one side holds a twentieth.
@@ -211,14 +211,15 @@ impl Equations for HystereticDevice {
             recording.input(Channel::Velocity),
         );
         // The device begins as it was left: under the first measured force, or somewhere in the gap. Between, it begins
-        // between, so that no fit of a zero ends where one becomes the other.
+        // nearer to the gap's end, then under a part of the force, so that no fit of a zero is stopped in between.
         let first = recording.output().first().copied().unwrap_or(f64::NAN) - zero;
-        let held = ((first.abs() / (HELD * coulomb)).max(1.0) - 1.0).min(1.0);
+        let beyond = first.abs() / (HELD * coulomb);
+        let [at_end, held] = [1.0, 2.0].map(|from| (beyond.max(from) - from).min(1.0));
         let mut force = held * first.max(-coulomb).min(coulomb);
         // Travelled part of the gap, 0 at its negative end.
         let left = (0.5 + session.gap_travelled).clamp(0.0, 1.0);
         let end = if first > 0.0 { 1.0 } else { 0.0 };
-        let mut travelled = gap * (held * end + (1.0 - held) * left);
+        let mut travelled = gap * (at_end * end + (1.0 - at_end) * left);
         let (mut shown, mut shown_rate) = (force, 0.0);
         // Twelve steps a radian of the load path at least, sixty-four a sample at most.
         let radians = resonance * recording.period();
@@ -365,33 +366,75 @@ mod tests {
     use super::*;
     use recordings::Recording;
 
-    #[test]
-    fn a_device_in_its_gap_shows_the_load_cell_s_zero() {
-        // Through 4 mm of a gap of 10, from its middle; then it takes hold and slides.
+    /// What the load cell shows of a device with a gap of 10 mm that moves through 4 mm of it from its middle, takes
+    /// hold and slides at 10 kN; its first force is `first`.
+    fn shown(first: f64, stated: f64, found: f64) -> Vec<f64> {
         let displacement: Vec<f64> = (0..1000).map(|k| 1e-5 * f64::from(k)).collect();
         let n = displacement.len();
         let channels = vec![
             (Channel::Displacement, displacement),
             (Channel::Velocity, vec![0.01; n]),
-            // Not the force of a device that is held: without a force the cell reads as much.
-            (FORCE, vec![800.0; n]),
+            (FORCE, vec![first; n]),
         ];
         let recording = Recording::new("crosses", 1e-3, channels).unwrap();
         let recording = RigRecording::new(recording, HystereticDevice::INPUTS, FORCE);
         let effects = Effects {
             free_play: FreePlay { gap: 0.010 },
-            load_cell_zero: LoadCellZero { zero: 800.0 },
+            load_cell_zero: LoadCellZero { zero: found },
             ..Effects::off().unwrap()
         };
         let nominal = Nominal {
             coulomb_force: 1e4,
             stiffness: 1e8,
+            load_cell_zero: stated,
         };
         let mut out = vec![0.0; n];
         let session = Session::default();
         HystereticDevice.simulate(&recording, &nominal, &effects, &session, &mut out);
-        assert!((out[400] - 800.0).abs() < 1e-9, "{}", out[400]);
-        assert!((out[n - 1] - 10_800.0).abs() < 1e-6, "{}", out[n - 1]);
+        out
+    }
+
+    #[test]
+    fn a_device_in_its_gap_shows_the_load_cell_s_zero() {
+        // Not the force of a device that is held: without a force the cell reads as much.
+        for (stated, found) in [(0.0, 800.0), (800.0, 0.0), (500.0, 300.0)] {
+            let out = shown(800.0, stated, found);
+            assert!((out[400] - 800.0).abs() < 1e-9, "{}", out[400]);
+            assert!((out[999] - 10_800.0).abs() < 1e-6, "{}", out[999]);
+        }
+    }
+
+    #[test]
+    fn a_device_begins_between_the_middle_of_its_gap_and_its_end_where_its_first_force_is_small() {
+        let begins = |first: f64| {
+            let out = shown(first, 0.0, 0.0);
+            (out[0], out.iter().position(|force| *force > 5e3).unwrap())
+        };
+        let (force, middle) = begins(0.0);
+        assert!(
+            force == 0.0 && (500..510).contains(&middle),
+            "{force} {middle}"
+        );
+        assert_eq!(begins(499.0), (force, middle));
+        // Half way to the end of the gap, then at it, then under half of the force, then under all of it.
+        for (first, begin, held) in [
+            (750.0, 0.0, 255),
+            (999.0, 0.0, 6),
+            (1250.0, 625.0, 5),
+            (1600.0, 1600.0, 4),
+        ] {
+            let (force, found) = begins(first);
+            assert!((force - begin).abs() < 1e-9, "{force} {begin}");
+            assert!(found.abs_diff(held) < 3, "{found} {held}");
+        }
+        // No jump anywhere, by which a fit of a zero would be stopped.
+        for first in [500.0, 1000.0, 1500.0] {
+            let [one, two] = [first - 0.01, first + 0.01].map(begins);
+            assert!(
+                (one.0 - two.0).abs() < 1.0 && one.1.abs_diff(two.1) < 2,
+                "{one:?} {two:?}"
+            );
+        }
     }
 
     #[test]
@@ -420,6 +463,7 @@ mod tests {
         let nominal = Nominal {
             coulomb_force: 1e4,
             stiffness: 1e8,
+            load_cell_zero: 0.0,
         };
         let mut out = vec![0.0; n];
         HystereticDevice.simulate(
