@@ -67,7 +67,7 @@ effects! {
     /// softly than it lets go.
     stiffer_unloading: StifferUnloading {
         excess: size("1", 0.05, (-0.9, 20.0)),
-    } from [[0.5], [-0.3]];
+    } from [[0.5], [-0.3]], like ["rounded_transition"];
     /// k± = k (1 ± a).
     asymmetric_stiffness: AsymmetricStiffness {
         asymmetry: size("1", 0.03, (-0.9, 0.9)),
@@ -86,7 +86,7 @@ effects! {
     rounded_transition: RoundedTransition {
         rounding: size("1", 0.05, (0.0, 1.0)),
         exponent: shape("1", 2.0, 0.7),
-    } from [[0.5, 2.0], [0.9, 1.0]];
+    } from [[0.5, 2.0], [0.9, 1.0]], like ["stiffer_unloading"];
     /// Soft begin of contact: k (1 - p e^{-|f| / (c F)}); p near one would be free play.
     progressive_contact: ProgressiveContact {
         softness: size("1", 0.05, (0.0, 0.8)),
