@@ -324,13 +324,12 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
     }
 
     /// The end of a search that begins from `found`, or from it without one of its effects, if it pays as an effect
-    /// must: what was taken while others were missing may replace them.
+    /// must: what was taken while others were missing may replace them. The last look backward is that at `found`.
     fn exchanged(&mut self, found: &Simulated) -> Option<Simulated> {
         let mut best = found.clone();
         let mut is_other = false;
         let mut tried = BTreeSet::new();
         'better: while best.point.effects.len() > 1 && !self.observer.is_over() {
-            self.reduced(&best)?;
             let without = std::mem::take(&mut self.without).into_iter();
             let own = best.point.effects.iter().map(|(i, _)| Some(*i));
             let mut starts: Vec<(Option<usize>, Simulated)> = own.zip(without).collect();
@@ -668,7 +667,8 @@ pub fn select_jointly<M: SimulatedModel>(
     while !best.point.effects.is_empty() {
         match selection.reduced(&best) {
             Some(Some(smaller)) => best = smaller,
-            _ => break,
+            Some(None) => break,
+            None => return Some((best, None)),
         }
     }
     let other = model.is_cheap().then(|| selection.exchanged(&best));
@@ -765,25 +765,33 @@ mod tests {
         }
     }
 
-    /// `y = a x + c z` of two halves. In the second one x and z hardly differ, and what else is in it is as what they
-    /// differ by.
+    /// Two halves of a record with a nominal parameter and effects of one size each.
     struct Halves {
         candidates: Vec<Candidate>,
+        /// What a point leaves of a sample, counted in its half.
+        left: fn(&Point, usize, usize) -> f64,
     }
 
     impl Halves {
-        const APART: f64 = 0.01;
-
-        /// x, z and what else is measured.
-        fn at(half: usize, k: usize) -> [f64; 3] {
-            let t = k as f64 / 10.0;
-            let (x, other) = (t.sin(), (2.3 * t).sin());
-            if half == 0 {
-                [x, other, 0.0]
-            } else {
-                let apart = Self::APART * other;
-                [x, x + apart, 2.0 * apart]
-            }
+        fn new(effects: &[&'static str], left: fn(&Point, usize, usize) -> f64) -> Self {
+            let candidate = |effect: &&'static str| Candidate {
+                effect,
+                parameters: vec![EffectParameter {
+                    name: "size",
+                    unit: "1",
+                    scale: Scale::Linear(1.0),
+                    role: Role::Size { weak: 0.1 },
+                    bounds: (-50.0, 50.0),
+                }],
+                starts: vec![vec![0.5]],
+                look_alikes: &[],
+                tolerance: 1.0,
+                contains: None,
+                law: "",
+                is_linear: false,
+            };
+            let candidates = effects.iter().map(candidate).collect();
+            Self { candidates, left }
         }
     }
 
@@ -804,16 +812,13 @@ mod tests {
             if record == 2 { 2 * SAMPLES } else { SAMPLES }
         }
         fn errors(&self, point: &Point, record: usize, _: usize) -> Vec<f64> {
-            let (a, effect) = (point.nuisance[0], point.effects.first());
-            let c = effect.map_or(0.0, |(_, q)| q[0]);
             let halves = if record == 2 {
                 0..2
             } else {
                 record..record + 1
             };
-            let all = halves.flat_map(|half| (0..SAMPLES).map(move |k| Self::at(half, k)));
-            all.map(|[x, z, more]| (1.0 - a) * x + (1.0 - c) * z + more)
-                .collect()
+            let all = halves.flat_map(|half| (0..SAMPLES).map(move |k| (half, k)));
+            all.map(|(half, k)| (self.left)(point, half, k)).collect()
         }
         fn folds(&self, _: usize) -> [usize; 2] {
             [0, 1]
@@ -824,6 +829,7 @@ mod tests {
         fn held(&self) -> Self {
             Self {
                 candidates: self.candidates.clone(),
+                left: self.left,
             }
         }
         fn record_name(&self, _: usize) -> &str {
@@ -831,26 +837,36 @@ mod tests {
         }
     }
 
+    /// `y = a x + c z`. In the second half x and z hardly differ, and what else is in it is as what they differ by.
+    fn alike_in_one_half(point: &Point, half: usize, k: usize) -> f64 {
+        let (a, effect) = (point.nuisance[0], point.effects.first());
+        let c = effect.map_or(0.0, |(_, q)| q[0]);
+        let t = k as f64 / 10.0;
+        let (x, other) = (t.sin(), (2.3 * t).sin());
+        let apart = 0.01 * other;
+        let (z, more) = if half == 0 {
+            (other, 0.0)
+        } else {
+            (x + apart, 2.0 * apart)
+        };
+        (1.0 - a) * x + (1.0 - c) * z + more
+    }
+
+    /// A sum of the waves 0, 1 and 3; the wave 2 is like the first two together.
+    fn like_two_waves(point: &Point, half: usize, k: usize) -> f64 {
+        let k = half * SAMPLES + k;
+        let t = k as f64 / 10.0;
+        let [first, second, other, apart] =
+            [1.0, 1.9, 3.1, 4.3].map(|frequency| (frequency * t + frequency).sin());
+        let waves = [first, second, first + second + 0.3 * apart, other];
+        let found = point.effects.iter().map(|(i, q)| q[0] * waves[*i]);
+        let noise = 1e-3 * (37.0 * k as f64).sin();
+        first + second + other + noise - point.nuisance[0] - found.sum::<f64>()
+    }
+
     #[test]
     fn an_effect_that_all_data_need_stays_where_one_half_does_not_determine_it() {
-        let model = Halves {
-            candidates: vec![Candidate {
-                effect: "other",
-                parameters: vec![EffectParameter {
-                    name: "size",
-                    unit: "1",
-                    scale: Scale::Linear(1.0),
-                    role: Role::Size { weak: 0.1 },
-                    bounds: (-50.0, 50.0),
-                }],
-                starts: vec![vec![0.5]],
-                look_alikes: &[],
-                tolerance: 1.0,
-                contains: None,
-                law: "",
-                is_linear: false,
-            }],
-        };
+        let model = Halves::new(&["other"], alike_in_one_half);
         let start = Point {
             nuisance: vec![0.5],
             effects: vec![(0, vec![0.5])],
@@ -876,106 +892,19 @@ mod tests {
         assert!((size.unwrap() - 1.0).abs() < 0.05, "{found:?}");
     }
 
-    /// A sum of three waves, for which a fourth one, like two of them together, is taken first.
-    struct Waves {
-        candidates: Vec<Candidate>,
-    }
-
-    impl Waves {
-        const LIKE_BOTH: usize = 2;
-
-        fn new() -> Self {
-            let wave = |effect| Candidate {
-                effect,
-                parameters: vec![EffectParameter {
-                    name: "size",
-                    unit: "1",
-                    scale: Scale::Linear(1.0),
-                    role: Role::Size { weak: 0.1 },
-                    bounds: (-50.0, 50.0),
-                }],
-                starts: vec![vec![0.5]],
-                look_alikes: &[],
-                tolerance: 1.0,
-                contains: None,
-                law: "",
-                is_linear: true,
-            };
-            let candidates = ["first", "second", "like_both", "other"].map(wave).to_vec();
-            Self { candidates }
-        }
-
-        fn at(k: usize) -> [f64; 4] {
-            let t = k as f64 / 10.0;
-            let [first, second, other, apart] =
-                [1.0, 1.9, 3.1, 4.3].map(|frequency| (frequency * t + frequency).sin());
-            [first, second, first + second + 0.3 * apart, other]
-        }
-    }
-
-    impl SimulatedModel for Waves {
-        fn nuisance(&self) -> usize {
-            1
-        }
-        fn candidates(&self) -> &[Candidate] {
-            &self.candidates
-        }
-        fn blocks(&self) -> usize {
-            1
-        }
-        fn block_of(&self, _: usize) -> Option<usize> {
-            None
-        }
-        fn samples(&self, record: usize, _: usize) -> usize {
-            if record == 2 { 2 * SAMPLES } else { SAMPLES }
-        }
-        fn errors(&self, point: &Point, record: usize, _: usize) -> Vec<f64> {
-            let own = match record {
-                2 => 0..2 * SAMPLES,
-                half => half * SAMPLES..(half + 1) * SAMPLES,
-            };
-            own.map(|k| {
-                let waves = Self::at(k);
-                let found = point.effects.iter().map(|(i, q)| q[0] * waves[*i]);
-                let noise = 1e-3 * (37.0 * k as f64).sin();
-                waves[0] + waves[1] + waves[3] + noise - point.nuisance[0] - found.sum::<f64>()
-            })
-            .collect()
-        }
-        fn folds(&self, _: usize) -> [usize; 2] {
-            [0, 1]
-        }
-        fn screen(&self, record: usize) -> usize {
-            record
-        }
-        fn held(&self) -> Self {
-            Self {
-                candidates: self.candidates.clone(),
-            }
-        }
-        fn record_name(&self, _: usize) -> &str {
-            "waves"
-        }
-    }
-
     #[test]
     fn what_replaced_two_effects_goes_where_both_of_them_do_better() {
-        let model = Waves::new();
+        let model = Halves::new(&["first", "second", "like_both", "other"], like_two_waves);
         let start = Point {
             nuisance: vec![0.0],
-            effects: vec![(Waves::LIKE_BOTH, vec![0.9]), (3, vec![0.9])],
+            effects: vec![(2, vec![0.9]), (3, vec![0.9])],
         };
         let (_, found) = select_jointly(&model, &[start], 2, Observer::none()).unwrap();
         let found = found.unwrap();
         let mut effects: Vec<usize> = found.point.effects.iter().map(|(i, _)| *i).collect();
         effects.sort_unstable();
         assert_eq!(effects, [0, 1, 3], "{found:?}");
-        assert!(
-            found
-                .point
-                .effects
-                .iter()
-                .all(|(_, q)| (q[0] - 1.0).abs() < 0.01)
-        );
+        let mut sizes = found.point.effects.iter().map(|(_, q)| q[0]);
+        assert!(sizes.all(|size| (size - 1.0).abs() < 0.01), "{found:?}");
     }
 }

@@ -179,11 +179,15 @@ fn has_word(added: Added, name: &Value) -> bool {
     added.words().iter().any(|word| name.contains(word))
 }
 
+/// The number of a parameter under `key`, in `unit`.
+fn number(parameter: &Value, key: &str, unit: &str) -> Option<f64> {
+    units::convert(parameter[key].as_f64()?, parameter["unit"].as_str()?, unit).ok()
+}
+
 /// Every value of an effect or a found parameter whose name says it, with its standard error, in `unit`.
 fn said(json: &Value, added: Added, unit: &str) -> Vec<(f64, f64)> {
     let has_word = |name: &Value| has_word(added, name);
-    let number =
-        |p: &Value, key: &str| units::convert(p[key].as_f64()?, p["unit"].as_str()?, unit).ok();
+    let number = |p: &Value, key: &str| number(p, key, unit);
     let effects = json["effects"]
         .as_array()
         .into_iter()
@@ -213,12 +217,15 @@ fn said(json: &Value, added: Added, unit: &str) -> Vec<(f64, f64)> {
 fn own(json: &Value, added: Added, unit: &str) -> (f64, f64) {
     let fitted = || {
         let parameters = json["rig"]["confirmed"]["parameters"].as_array()?;
-        let of =
-            |p: &Value, key: &str| units::convert(p[key].as_f64()?, p["unit"].as_str()?, unit).ok();
         parameters
             .iter()
             .filter(|p| has_word(added, &p["name"]))
-            .find_map(|p| Some((of(p, "value")?, of(p, "standard_error")?)))
+            .find_map(|p| {
+                Some((
+                    number(p, "value", unit)?,
+                    number(p, "standard_error", unit)?,
+                ))
+            })
     };
     let said = said(json, added, unit);
     said.first().copied().or_else(fitted).unwrap_or_default()

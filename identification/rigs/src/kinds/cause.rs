@@ -81,24 +81,17 @@ impl Cause {
             format!("{text} %")
         };
         let more = if by > 0.0 { "more" } else { "less" };
+        let high = if by > 0.0 { "high" } else { "low" };
+        let too = |what: &str| format!("{what} {} too {high}", size(unit));
         match name.as_str() {
             "command_delay" => {
                 let when = if by > 0.0 { "late" } else { "early" };
                 format!("the command arrives {} {when}", size(unit))
             }
             "scale" => format!("the table moves {} {more} than commanded", share()),
-            "offset" if unit == "m" => {
-                let way = if by > 0.0 { "high" } else { "low" };
-                format!("the displacement reads {} too {way}", size(unit))
-            }
-            "load_cell_zero" => {
-                let way = if by > 0.0 { "high" } else { "low" };
-                format!("the load cell reads {} too {way}", size(unit))
-            }
-            "position_zero" => {
-                let way = if by > 0.0 { "high" } else { "low" };
-                format!("the recorded position is {} too {way}", size(unit))
-            }
+            "offset" if unit == "m" => too("the displacement reads"),
+            "load_cell_zero" => too("the load cell reads"),
+            "position_zero" => too("the recorded position is"),
             "accelerometer_scale" => format!(
                 "the accelerometer reads {} {more} than the displacement says",
                 share()
