@@ -210,7 +210,8 @@ USABLE = r"""(() => {
   document.activeElement?.blur();
   return all.map((one) => (one.getAttribute("aria-label") || one.textContent || one.id || one.tagName).trim().slice(0, 40));
 })()"""
-FOCUSED = r"""(() => {
+FOCUSED = r"""(async () => {
+  await new Promise(requestAnimationFrame);
   const one = document.activeElement, style = getComputedStyle(one);
   const shows = style.outlineStyle !== "none" && parseFloat(style.outlineWidth) > 0 || style.boxShadow !== "none";
   return [one.dataset.usable === undefined ? null : Number(one.dataset.usable), shows];
