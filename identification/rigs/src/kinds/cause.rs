@@ -27,9 +27,30 @@ impl Cause {
     /// The cause, if `found` is beyond two of the deviations `stated_within` of `stated`, and by more than
     /// chance.
     pub fn of(found: NamedValue, (stated, stated_within): (f64, f64)) -> Option<Self> {
-        let off = (found.value - stated).abs();
-        let clear = off > 2.0 * stated_within && off > 2.5 * found.standard_error;
-        clear.then_some(Self { found, stated })
+        Self::perhaps(found, (stated, stated_within)).filter(Self::is_clear)
+    }
+
+    /// As [`Self::of`], where it may be chance.
+    pub(super) fn perhaps(found: NamedValue, (stated, stated_within): (f64, f64)) -> Option<Self> {
+        let is_off = (found.value - stated).abs() > 2.0 * stated_within;
+        is_off.then_some(Self { found, stated })
+    }
+
+    /// Whether it is off by more than chance.
+    pub(super) fn is_clear(&self) -> bool {
+        self.deviations() > 2.5
+    }
+
+    /// Probability that a share of this size is off by as much as rigs are and not by chance, either as likely
+    /// before the data.
+    pub(super) fn weight(&self) -> f64 {
+        // Standard deviation of the shares by which what is off is off.
+        const OFF: f64 = 0.1;
+        let error = self.found.standard_error;
+        let off = self.found.value - self.stated;
+        let density = |deviation: f64| (-0.5 * (off / deviation).powi(2)).exp() / deviation;
+        let [chance, fault] = [density(error), density(error.hypot(OFF))];
+        fault / (fault + chance)
     }
 
     /// Widens its interval to what data leave open, from `low` to `high`: the middle may be beside what a fit found.
@@ -260,6 +281,21 @@ mod tests {
             unit: unit.into(),
             standard_error,
         }
+    }
+
+    #[test]
+    fn a_share_weighs_as_much_as_it_is_beyond_chance() {
+        let weight = |value: f64, error: f64| {
+            let found = found("accelerometer_scale", value, error, "1");
+            Cause::perhaps(found, (1.0, 0.01)).map(|own| own.weight())
+        };
+        assert_eq!(weight(1.015, 1e-3), None);
+        // Both densities are those of a normal distribution: 0.05 beside 0.02 and beside 0.102.
+        let own = weight(1.05, 0.02).unwrap();
+        assert!((own - 0.7983).abs() < 1e-4, "{own}");
+        assert_eq!(weight(0.95, 0.02), Some(own));
+        assert!(weight(1.05, 0.01).unwrap() > 0.999);
+        assert!(weight(1.03, 0.05).unwrap() < 0.35);
     }
 
     #[test]

@@ -244,7 +244,7 @@ impl Equations for ClosedLoopActuator {
             standard_error: own.standard_error.hypot(folded / INTERVAL_95),
             ..own
         });
-        let cause = scale.and_then(|scale| Cause::of(scale, (1.0, CALIBRATED)));
+        let cause = scale.and_then(|scale| Cause::perhaps(scale, (1.0, CALIBRATED)));
         cause.into_iter().collect()
     }
 

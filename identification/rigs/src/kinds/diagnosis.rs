@@ -16,7 +16,7 @@ use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
 use super::profile::{self, Open};
-use super::readings::{Crossed, Reading, Weighed, in_words, ranked};
+use super::readings::{Crossed, Reading, Weighed, in_words, ranked, with_and_without};
 use super::{Description, DescriptionError, Measurement};
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::gain_interval;
@@ -450,11 +450,16 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             _ => causes.push(told),
         }
     }
-    causes.extend(measured.contradictions().into_iter().filter(|cause| {
-        // Of records that no model explains, sensors tell less too.
-        holds || explains || leaves_little || cause.deviations() > FAR
-    }));
-    let readings = readings(measured, weighed, &causes, &doubted, (&confirmed, crossed));
+    // Of records that no model explains, sensors tell less too.
+    let tells = holds || explains || leaves_little;
+    let (clear, suspected): (Vec<_>, Vec<_>) = measured
+        .contradictions()
+        .into_iter()
+        .filter(|cause| tells || cause.deviations() > FAR)
+        .partition(Cause::is_clear);
+    causes.extend(clear);
+    let told = [&causes[..], &doubted, &suspected];
+    let readings = readings(measured, weighed, told, (&confirmed, crossed));
     let of_parts = [&as_described, &swapped].into_iter();
     let mut matter: Vec<&PartEffect> = of_parts.flat_map(|part| &part.effects).collect();
     matter.retain(|own| own.objection.as_deref() != Some(TOO_SMALL) && own.share > NOTHING);
@@ -484,15 +489,15 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     })
 }
 
-/// What is weighed against the named model, and that model with what is doubted in it.
+/// What is weighed against the named model, and that model with what is doubted in it, each with and without what
+/// is suspected.
 fn readings<M: InParts>(
     measured: &M,
     mut weighed: Vec<Weighed>,
-    causes: &[Cause],
-    doubted: &[Cause],
+    [causes, doubted, suspected]: [&[Cause]; 3],
     (named, crossed): (&Confirmed, Crossed),
 ) -> Vec<Reading> {
-    if weighed.is_empty() {
+    if weighed.is_empty() && suspected.is_empty() {
         return Vec::new();
     }
     for own in &mut weighed {
@@ -505,7 +510,8 @@ fn readings<M: InParts>(
     });
     let tested = Part::LeftOut as usize;
     let origin = completed(measured, &measured.origin(), None, tested);
-    ranked(weighed, &all_errors(measured, &origin, tested))
+    let ranked = ranked(weighed, &all_errors(measured, &origin, tested));
+    suspected.iter().fold(ranked, with_and_without)
 }
 
 fn no_output(description: &Description) -> DescriptionError {

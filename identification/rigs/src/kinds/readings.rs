@@ -178,6 +178,25 @@ pub(super) fn ranked(all: Vec<Weighed>, nominal: &[f64]) -> Vec<Reading> {
     readings
 }
 
+/// Every reading with and without `cause`, which no part predicts, the likeliest first.
+pub(super) fn with_and_without(readings: Vec<Reading>, cause: &Cause) -> Vec<Reading> {
+    let weight = cause.weight();
+    let both = readings.into_iter().flat_map(|without| {
+        let mut with = without.clone();
+        with.causes.push(cause.clone());
+        with.weight *= weight;
+        let less = without.weight - with.weight;
+        let without = Reading {
+            weight: less,
+            ..without
+        };
+        [with, without]
+    });
+    let mut both: Vec<Reading> = both.collect();
+    both.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    both
+}
+
 impl Reading {
     fn says(&self, name: &str) -> bool {
         let mut effects = self.effects.iter();
@@ -245,6 +264,35 @@ mod tests {
         assert!(!with.needs(&crossed([1.02, 1.02])));
         assert!(with.needs(&crossed([1.5, 0.99])));
         assert!(!with.needs(&crossed([1.5, 0.8])));
+    }
+
+    #[test]
+    fn what_sensors_may_say_is_beside_every_reading() {
+        let found = NamedValue {
+            name: "accelerometer_scale".into(),
+            value: 0.95,
+            unit: "1".into(),
+            standard_error: 0.02,
+        };
+        let cause = Cause { found, stated: 1.0 };
+        let named = Weighed {
+            causes: Vec::new(),
+            effects: vec![("friction".into(), Vec::new())],
+            crossed: crossed([1.0, 1.0]),
+        };
+        let readings = with_and_without(ranked(vec![named], &vec![3.0; 2000]), &cause);
+        let [with, without] = &readings[..] else {
+            panic!("there are two: {readings:?}");
+        };
+        assert_eq!((with.causes.len(), without.causes.len()), (1, 0));
+        assert_eq!(with.effects, without.effects);
+        assert!((with.weight - cause.weight()).abs() < 1e-12);
+        assert!((with.weight + without.weight - 1.0).abs() < 1e-12);
+        assert_eq!(
+            in_words(&readings, &|name| name == "friction"),
+            " Perhaps, but not for sure from these data: the accelerometer reads 5 ± 4 % less than the \
+             displacement says, with a weight of 0.80."
+        );
     }
 
     #[test]

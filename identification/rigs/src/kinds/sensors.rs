@@ -156,6 +156,8 @@ fn responses(one: &RigRecording, command: Channel) -> Option<Vec<Line>> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Equations;
+    use super::super::closed_loop_actuator::ClosedLoopActuator;
     use super::*;
     use recordings::Recording;
 
@@ -200,6 +202,19 @@ mod tests {
         let found = accelerometer_scale(&[recording(|_| 1.08, 0.01)], COMMAND).unwrap();
         assert!((found.value - 1.08).abs() < 4e-3, "{found:?}");
         assert!(found.standard_error < 15e-3, "{found:?}");
+    }
+
+    #[test]
+    fn a_scale_is_a_cause_if_it_is_clear_and_otherwise_a_suspicion() {
+        let said = |scale: f64| {
+            let all = [recording(|_| scale, 0.05)];
+            let causes = Equations::contradictions(&ClosedLoopActuator, &all);
+            let causes = causes.iter().map(|own| (own.found.value, own.is_clear()));
+            causes.collect::<Vec<_>>()
+        };
+        assert!(matches!(said(0.92)[..], [(value, true)] if (value - 0.92).abs() < 4e-3));
+        assert!(matches!(said(0.97)[..], [(value, false)] if (value - 0.97).abs() < 4e-3));
+        assert_eq!(said(0.99), []);
     }
 
     #[test]
