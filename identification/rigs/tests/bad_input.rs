@@ -360,6 +360,22 @@ fn a_sign_turned_over_is_told_from_an_effect() {
     );
 }
 
+/// Gravity on the accelerometer is larger than the acceleration of slow motion.
+#[test]
+fn a_table_that_pitches_is_told_from_wrong_columns() {
+    let mut case = healthy();
+    for recording in [&mut case.identification, &mut case.validation] {
+        let displacement = recording.samples(Channel::Displacement).to_vec();
+        edit(recording, Channel::Acceleration, |values| {
+            let pairs = values.iter_mut().zip(&displacement);
+            pairs.for_each(|(a, x)| *a += 16.4 * x);
+        });
+    }
+    let found = diagnose(&case, Observer::none()).unwrap();
+    let named: Vec<&str> = found.effects.iter().map(|own| own.effect).collect();
+    assert!(named.contains(&"accelerometer_tilt"), "{named:?}");
+}
+
 #[test]
 fn a_reversed_command_is_told_from_an_effect() {
     let mut case = healthy();

@@ -15,6 +15,8 @@ const NEARLY: f64 = 2.0;
 const ALMOST: f64 = 3.0;
 /// The same of an effect in the place of another one, over the error with that.
 const BEHIND: f64 = 2.0;
+/// Error on all data over that of the likeliest model that is slightly more.
+const SLIGHTLY: f64 = 1.2;
 /// Error, over the output, that tells nothing of that: without noise a fit that is nearly there is far off.
 const LITTLE: f64 = 0.01;
 
@@ -70,8 +72,8 @@ impl Rival {
 
 /// The model at `point` and those with effects in the place of others of their class, each from the best of its
 /// starts. First the likeliest, or one that is nearly as likely with effects that are more common; the rest are
-/// those that do nearly as well, and those that fit all data better though either part predicts the other worse: the
-/// data do not say which.
+/// those that do nearly as well, those that fit all data better though either part predicts the other worse, and those
+/// that leave slightly more of next to nothing, which is what models get wrong alike: the data do not say which.
 pub(super) fn of_its_class<M: InParts>(
     measured: &M,
     point: &Point,
@@ -114,8 +116,11 @@ pub(super) fn of_its_class<M: InParts>(
     }
     let best = all.swap_remove(best);
     all.retain(|own| replaced(&best.point, &own.point).is_some());
+    let error = |own: &Rival| measured.normalised_error(&own.point, EVERYTHING);
+    let most = (SLIGHTLY * error(&best)).min(LITTLE);
+    let is_near =
+        |(by, own): &(f64, Rival)| *by < NEARLY || own.fits_better_than(&best) || error(own) < most;
     let behind = all.into_iter().map(|own| (best.likelier_than(&own), own));
-    let is_near = |(by, own): &(f64, Rival)| *by < NEARLY || own.fits_better_than(&best);
     let mut near: Vec<(f64, Rival)> = behind.filter(is_near).collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0));
     let others: Vec<Rival> = near.into_iter().map(|(_, own)| own).collect();

@@ -10,7 +10,7 @@ use super::alternatives::{
 use super::cause::{Cause, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
     Confirmed, NominalFits, Refused, TOO_SMALL, agrees, confirm, effects as named_values, is_vital,
-    lengths, needed, unfit,
+    lengths, needed, unfit, without_effect,
 };
 use super::measured::Measured;
 use super::named_value::NamedValue;
@@ -21,8 +21,8 @@ use super::{Description, DescriptionError, Measurement};
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::gain_interval;
 use diagnosis::{
-    Observer, Point, Progress, Selected, Verdict, all_errors, completed, select, select_jointly,
-    settled, squares,
+    Observer, Point, Progress, Selected, Verdict, all_errors, completed, refit, select,
+    select_jointly, settled, squares,
 };
 
 /// Share of the described model's error that is left, in both parts, where a nominal parameter that is so many
@@ -37,6 +37,8 @@ const UNUSED: &str = "the prediction of the other part is better without it";
 const AS_WELL: f64 = 1.02;
 /// Error of a model, over the output, that leaves nothing to doubt in how the output is measured.
 const SMALL: f64 = 0.05;
+/// And that leaves nothing to explain, where each part is predicted from the other.
+const EXACT: f64 = 0.01;
 /// Share of the described model's squared error that is nothing to explain.
 const NOTHING: f64 = 1e-3;
 /// Share of the squared error beyond which what is explained is all of it.
@@ -458,6 +460,13 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         .filter(|cause| tells || cause.deviations() > FAR)
         .partition(Cause::is_clear);
     causes.extend(clear);
+    let leaves_nothing = tests.into_iter().all(|(error, _)| error < EXACT);
+    let is_answered = !confirmed.effects.is_empty() || !causes.is_empty() || leaves_nothing;
+    // What was found and is not named is ranked.
+    if !is_answered && !observer.is_over() {
+        let proposed = [&start.point, &as_described.point, &swapped.point];
+        weighed.extend(unnamed(measured, proposed));
+    }
     let told = [&causes[..], &doubted, &suspected];
     let readings = readings(measured, weighed, told, (&confirmed, crossed));
     let of_parts = [&as_described, &swapped].into_iter();
@@ -465,7 +474,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     matter.retain(|own| own.objection.as_deref() != Some(TOO_SMALL) && own.share > NOTHING);
     let verdict = match (named.is_empty() || !confirmed.pays, rivalled) {
         (true, _) if !causes.is_empty() => Verdict::Named,
-        (true, _) if matter.is_empty() && holds => Verdict::Adequate,
+        (true, _) if (matter.is_empty() || leaves_nothing) && holds => Verdict::Adequate,
         (true, _) => Verdict::Unexplained,
         (_, true) => Verdict::Ambiguous,
         _ => Verdict::Named,
@@ -512,6 +521,27 @@ fn readings<M: InParts>(
     let origin = completed(measured, &measured.origin(), None, tested);
     let ranked = ranked(weighed, &all_errors(measured, &origin, tested));
     suspected.iter().fold(ranked, with_and_without)
+}
+
+/// The models of different effects among those `proposed`, fitted to all data, without effects that these do not show.
+fn unnamed<M: InParts>(measured: &M, proposed: [&Point; 3]) -> Vec<Weighed> {
+    let mut known: Vec<Vec<usize>> = vec![Vec::new()];
+    let weighed = proposed.into_iter().filter_map(|point| {
+        let (found, deviations) = refit(measured, point, EVERYTHING)?;
+        let mut shown = found.point;
+        for (effect, _) in unfit(measured, &shown.clone(), &deviations, EVERYTHING) {
+            shown = without_effect(&shown, effect);
+        }
+        let mut own: Vec<usize> = shown.effects.iter().map(|(i, _)| *i).collect();
+        own.sort_unstable();
+        if known.contains(&own) {
+            return None;
+        }
+        known.push(own);
+        let crossed = Crossed::of(measured, &shown)?;
+        Weighed::of(measured, &shown, crossed)
+    });
+    weighed.collect()
 }
 
 fn no_output(description: &Description) -> DescriptionError {
@@ -637,8 +667,10 @@ impl RigDiagnosis {
     /// Effects that records cannot tell from `named`, with their parameters.
     fn instead_of(&self, named: &str) -> impl Iterator<Item = (&str, &[NamedValue])> {
         self.rivals_of(named).filter_map(move |rival| {
+            let has =
+                |own: &Reading, name: &str| own.effects.iter().any(|(known, _)| known == name);
             let mut readings = self.readings.iter();
-            let own = readings.find(|own| !own.effects.iter().any(|(name, _)| name == named))?;
+            let own = readings.find(|own| has(own, rival) && !has(own, named))?;
             let (name, values) = own.effects.iter().find(|(name, _)| name == rival)?;
             Some((name.as_str(), values.as_slice()))
         })

@@ -30,6 +30,9 @@ const VALVE: &str = "R1 valve and actuator";
 const EQUILIBRIUM: &str = "R2 equilibrium of the table";
 const KINEMATICS: &str = "R4 kinematics";
 
+/// Most of the displacement that a pitching table adds to its acceleration, 1/s^2: what moves at 1 Hz.
+const MOST_PITCH: f64 = 39.5;
+
 /// Relative difference below which the specimen's channel shows nothing, or the table.
 const LOOKS_ABSENT: f64 = 0.2;
 
@@ -120,11 +123,11 @@ pub fn relations(recording: &Recording, nominal: &Nominal) -> Vec<Relation> {
             .sum();
         (sum / bins.len().max(1) as f64).sqrt()
     };
+    let slow = bins.start..((SLOW / bin) as usize).clamp(bins.start, bins.end);
     let relative = |error: &dyn Fn(usize, Complex<f64>) -> (Complex<f64>, f64),
                     size: &[Complex<f64>]| {
-        let slow = bins.start..((SLOW / bin) as usize).clamp(bins.start, bins.end);
         let (mut wrong, mut whole) = (0.0, 0.0);
-        for k in slow {
+        for k in slow.clone() {
             wrong += error(k, Complex::new(0.0, omega(k))).0.norm_sqr();
             whole += size[k].norm_sqr();
         }
@@ -207,15 +210,23 @@ pub fn relations(recording: &Recording, nominal: &Nominal) -> Vec<Relation> {
             relative: None,
         });
     }
-    if let (Some(second), Some(a)) = (&second, &a) {
+    if let (Some(x), Some(second), Some(a)) = (&x, &second, &a) {
         let error = |k: usize, s: Complex<f64>| {
             let variance = sa * sa + (s * s).norm_sqr() * sx * sx;
             (a[k] - s * s / of_second(s) * second[k], variance)
         };
+        // Gravity on an accelerometer of a table that pitches is an effect, not a sign of wrong columns.
+        let (mut along, mut size) = (0.0, 0.0);
+        for k in slow.clone() {
+            along += (error(k, Complex::new(0.0, omega(k))).0 * x[k].conj()).re;
+            size += x[k].norm_sqr();
+        }
+        let pitch = (along / size).clamp(-MOST_PITCH, MOST_PITCH);
+        let level = |k: usize, s: Complex<f64>| (error(k, s).0 - x[k] * pitch, 1.0);
         all.push(Relation {
             name: KINEMATICS,
             ratio: ratio(&error),
-            relative: relative(&error, a),
+            relative: relative(&level, a),
         });
     }
     if let Some(law) = nominal.controller {
