@@ -566,7 +566,7 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
             .filter(may_go)
             .min_by(|&a, &b| compared[a].gain.total_cmp(&compared[b].gain))
             .filter(|&i| !compared[i].holds());
-        Some(least.map(|i| self.without.swap_remove(i)))
+        Some(least.map(|i| self.without[i].clone()))
     }
 }
 
@@ -589,10 +589,12 @@ pub fn select<M: SimulatedModel>(
         {
             found.best = Some(other);
         }
-        // What the last look backward left behind belongs to the one that was chosen.
-        if let Some(best) = &found.best {
-            selection.reduced(best)?;
-        }
+    }
+    // What the last look backward left behind belongs to the one that was chosen.
+    if let Some(best) = &found.best
+        && (model.is_cheap() || selection.without.len() != best.point.effects.len())
+    {
+        selection.reduced(best)?;
     }
     let nominal = found.nominal;
     let extended = found.best.unwrap_or_else(|| nominal.clone());
@@ -677,7 +679,11 @@ pub fn select_jointly<M: SimulatedModel>(
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+    use std::time::Duration;
+
     use super::*;
+    use crate::progress::Deadline;
     use crate::{Candidate, EffectParameter, Role, Scale};
 
     /// A swing whose frequency grows with its amplitude `p[0]`, by which a record begins; the later half of the
@@ -770,6 +776,7 @@ mod tests {
         candidates: Vec<Candidate>,
         /// What a point leaves of a sample, counted in its half.
         left: fn(&Point, usize, usize) -> f64,
+        is_cheap: bool,
     }
 
     impl Halves {
@@ -791,7 +798,11 @@ mod tests {
                 is_linear: false,
             };
             let candidates = effects.iter().map(candidate).collect();
-            Self { candidates, left }
+            Self {
+                candidates,
+                left,
+                is_cheap: true,
+            }
         }
     }
 
@@ -830,7 +841,11 @@ mod tests {
             Self {
                 candidates: self.candidates.clone(),
                 left: self.left,
+                is_cheap: self.is_cheap,
             }
+        }
+        fn is_cheap(&self) -> bool {
+            self.is_cheap
         }
         fn record_name(&self, _: usize) -> &str {
             "halves"
@@ -890,6 +905,29 @@ mod tests {
         let (found, _) = select_jointly(&model, &[start], 2, Observer::none()).unwrap();
         let size = found.point.effects.first().map(|(_, q)| q[0]);
         assert!((size.unwrap() - 1.0).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
+    fn a_search_that_time_ends_before_it_looks_back_knows_the_models_without_its_effects() {
+        let model = Halves {
+            is_cheap: false,
+            ..Halves::new(&["first", "second", "like_both", "other"], like_two_waves)
+        };
+        let deadline = Deadline::after(Duration::from_secs(1));
+        let has_waited = Cell::new(false);
+        let wait = |event: &Progress| {
+            let is_extended =
+                matches!(event, Progress::Model { effects, .. } if !effects.is_empty());
+            if is_extended && !has_waited.replace(true) {
+                std::thread::sleep(Duration::from_secs(1));
+            }
+        };
+        let observer = Observer::new(&wait).until(&deadline);
+        let found = select(&model, 2, observer).unwrap();
+        assert!(observer.has_cut());
+        assert_eq!(found.extended.point.effects.len(), 1);
+        assert_eq!(found.without.len(), 1);
+        assert!((found.without[0].squares / found.nominal.squares - 1.0).abs() < 1e-6);
     }
 
     #[test]

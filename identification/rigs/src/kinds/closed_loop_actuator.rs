@@ -237,7 +237,7 @@ impl Equations for ClosedLoopActuator {
         const ENOUGH: f64 = 200.0;
         let slowest = recordings
             .iter()
-            .map(RigRecording::period)
+            .map(|one| one.recorded_period)
             .fold(0.0, f64::max);
         let folded = CALIBRATED * (slowest * ENOUGH).max(1.0).powi(2);
         let scale = accelerometer_scale(recordings, COMMAND).map(|own| NamedValue {

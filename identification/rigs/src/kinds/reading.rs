@@ -231,6 +231,7 @@ impl Description {
                 channels.push((derived, from(way, period)));
             }
         }
+        let recorded_period = period;
         let (period, channels) = match &self.reduced_to {
             Some(rate) if !may_lack => {
                 let (rate, _) = self.si("reduced_to", rate, "1/s")?;
@@ -246,6 +247,7 @@ impl Description {
             Recording::new(&name, period, channels).map_err(at_fault)?
         };
         let mut recording = RigRecording::new(recording, rig.inputs(), rig.output());
+        recording.recorded_period = recorded_period;
         self.begin(&mut recording, rig, may_lack)?;
         Ok((recording, rows))
     }

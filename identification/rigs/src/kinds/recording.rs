@@ -11,6 +11,8 @@ use sysid::interpolation::band_limited;
 pub struct RigRecording {
     /// The channels, SI.
     recording: Recording,
+    /// Sampling period before neighbouring samples became means, s.
+    pub recorded_period: f64,
     /// What is simulated and compared.
     output: Channel,
     /// Further outputs that are compared, each with its size for one of the output, SI.
@@ -60,6 +62,7 @@ impl RigRecording {
         let low = first.iter().copied().fold(f64::INFINITY, f64::min);
         let high = first.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Self {
+            recorded_period: recording.period(),
             cleaned: median_of_five(first),
             between: half_way(first, high - low),
             middle: 0.5 * (low + high),

@@ -30,8 +30,10 @@ pub struct Guess {
 /// Least sampling rate of a test of motion, Hz: slower ones are times in another unit.
 pub const SLOWEST: f64 = 8.0;
 
-/// Sampling rate that is enough for a table's motion, Hz.
+/// Sampling rate that is enough for a table's motion, Hz, and that for long records of more samples than these.
 const ENOUGH: f64 = 200.0;
+const LONG: usize = 30_000;
+const ENOUGH_OF_LONG: f64 = 100.0;
 
 /// A kind, what it is, and its channels with the roles of their columns.
 type Known = (&'static str, &'static str, &'static [(&'static str, Role)]);
@@ -94,10 +96,11 @@ pub fn guess(files: &[PathBuf], columns: Option<&Path>) -> Result<Guess, Descrip
     let Some((kind, about, channels)) = fitting(false).or_else(|| fitting(true)) else {
         return Err(wrong(first, refusal(&sheet, &found)));
     };
-    let guessing = Guessing {
+    let mut guessing = Guessing {
         files,
         kind,
         columns: chosen(first, channels, &found, *kind == "closed_loop_actuator")?,
+        rate: ENOUGH,
     };
     // Without values of the nominal model, which are read from the data.
     let place = first.with_file_name("the guessed description");
@@ -106,6 +109,15 @@ pub fn guess(files: &[PathBuf], columns: Option<&Path>) -> Result<Guess, Descrip
     let rig = of_kind(kind).ok_or_else(|| wrong(first, format!("unknown kind {kind}")))?;
     check_rate(first, &measurement)?;
     let nominal = nominal(rig, &measurement);
+    if measurement
+        .recordings
+        .iter()
+        .map(RigRecording::len)
+        .sum::<usize>()
+        > LONG
+    {
+        guessing.rate = ENOUGH_OF_LONG;
+    }
     let text = guessing.text(&nominal);
     let description = Description::parse(&place, &text)?;
     let measurement = description.measurement(&[])?;
@@ -315,6 +327,8 @@ struct Guessing<'a> {
     files: &'a [PathBuf],
     kind: &'a str,
     columns: Vec<(&'static str, String, String)>,
+    /// Rate towards which faster records are reduced, Hz.
+    rate: f64,
 }
 
 /// A nominal parameter: name, value, one standard deviation, unit.
@@ -351,7 +365,8 @@ impl Guessing<'_> {
         let _ = writeln!(text, "# Faster records are reduced towards this rate.");
         let _ = writeln!(
             text,
-            "reduced_to = {{ value = {ENOUGH:?}, unit = \"1/s\" }}"
+            "reduced_to = {{ value = {:?}, unit = \"1/s\" }}",
+            self.rate
         );
         let _ = writeln!(text, "\n[columns]");
         for (channel, column, unit) in &self.columns {
