@@ -119,6 +119,26 @@ fn a_voltage_and_a_position_are_an_axis_beside_a_reference_without_a_unit() {
 }
 
 #[test]
+fn long_records_are_reduced_further_and_the_rate_they_were_recorded_at_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let period = |rows: u32| {
+        let mut text = String::from("time [s],command [mm],displacement [mm]\n");
+        for k in 0..rows {
+            let x = (0.02 * f64::from(k)).sin();
+            writeln!(text, "{:.3},{x:.4},{x:.4}", 0.004 * f64::from(k)).unwrap();
+        }
+        let file = folder.path().join(format!("{rows}.csv"));
+        std::fs::write(&file, text).unwrap();
+        let guessed = guess(&[file], None).unwrap();
+        let one = &guessed.measurement.recordings[0];
+        assert!((one.recorded_period - 0.004).abs() < 1e-9);
+        one.period()
+    };
+    assert!((period(29_000) - 0.004).abs() < 1e-9);
+    assert!((period(31_000) - 0.008).abs() < 1e-9);
+}
+
+#[test]
 fn what_cannot_be_told_is_asked() {
     let folder = tempfile::tempdir().unwrap();
     let asked = |header: &str, step: f64| -> String {

@@ -16,7 +16,7 @@ use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
 use super::profile::{self, Open};
-use super::readings::{Crossed, Reading, Weighed, in_words, ranked, with_and_without};
+use super::readings::{Crossed, Reading, Weighed, in_words, instead, ranked, with_and_without};
 use super::{Description, DescriptionError, Measurement};
 use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::gain_interval;
@@ -667,12 +667,8 @@ impl RigDiagnosis {
     /// Effects that records cannot tell from `named`, with their parameters.
     fn instead_of(&self, named: &str) -> impl Iterator<Item = (&str, &[NamedValue])> {
         self.rivals_of(named).filter_map(move |rival| {
-            let has =
-                |own: &Reading, name: &str| own.effects.iter().any(|(known, _)| known == name);
-            let mut readings = self.readings.iter();
-            let own = readings.find(|own| has(own, rival) && !has(own, named))?;
-            let (name, values) = own.effects.iter().find(|(name, _)| name == rival)?;
-            Some((name.as_str(), values.as_slice()))
+            let values = instead(&self.readings, named, rival)?;
+            Some((rival, values))
         })
     }
 

@@ -204,6 +204,18 @@ impl Reading {
     }
 }
 
+/// The values of `rival` in the likeliest of the `readings` that has it and not `named`.
+pub(super) fn instead<'a>(
+    readings: &'a [Reading],
+    named: &str,
+    rival: &str,
+) -> Option<&'a [NamedValue]> {
+    let of = |own: &'a Reading, name: &str| own.effects.iter().find(|(known, _)| known == name);
+    let mut without = readings.iter().filter(|own| of(own, named).is_none());
+    let (_, values) = without.find_map(|own| of(own, rival))?;
+    Some(values)
+}
+
 /// What readings say beyond what is `named`, in a sentence; nothing where there is none.
 pub(super) fn in_words(readings: &[Reading], named: &dyn Fn(&str) -> bool) -> String {
     let mut told: Vec<&str> = Vec::new();
@@ -293,6 +305,34 @@ mod tests {
             " Perhaps, but not for sure from these data: the accelerometer reads 5 ± 4 % less than the \
              displacement says, with a weight of 0.80."
         );
+    }
+
+    #[test]
+    fn every_rival_has_the_values_of_its_own_reading() {
+        let of = |name: &str, value: f64| Reading {
+            causes: Vec::new(),
+            effects: vec![(
+                name.to_owned(),
+                vec![NamedValue {
+                    name: "half_width".into(),
+                    value,
+                    unit: "m".into(),
+                    standard_error: 1e-6,
+                }],
+            )],
+            explains: 0.9,
+            weight: 0.3,
+        };
+        let readings = [
+            of("bristle_friction", 1.0),
+            of("friction", 2.0),
+            of("dead_band", 3.0),
+        ];
+        let value = |rival: &str| instead(&readings, "friction", rival).map(|own| own[0].value);
+        assert_eq!(value("bristle_friction"), Some(1.0));
+        assert_eq!(value("dead_band"), Some(3.0));
+        assert_eq!(value("friction"), None);
+        assert_eq!(value("free_play"), None);
     }
 
     #[test]
