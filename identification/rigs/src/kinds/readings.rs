@@ -181,15 +181,11 @@ pub(super) fn ranked(all: Vec<Weighed>, nominal: &[f64]) -> Vec<Reading> {
 /// Every reading with and without `cause`, which no part predicts, the likeliest first.
 pub(super) fn with_and_without(readings: Vec<Reading>, cause: &Cause) -> Vec<Reading> {
     let weight = cause.weight();
-    let both = readings.into_iter().flat_map(|without| {
+    let both = readings.into_iter().flat_map(|mut without| {
         let mut with = without.clone();
         with.causes.push(cause.clone());
         with.weight *= weight;
-        let less = without.weight - with.weight;
-        let without = Reading {
-            weight: less,
-            ..without
-        };
+        without.weight -= with.weight;
         [with, without]
     });
     let mut both: Vec<Reading> = both.collect();

@@ -109,13 +109,8 @@ pub fn guess(files: &[PathBuf], columns: Option<&Path>) -> Result<Guess, Descrip
     let rig = of_kind(kind).ok_or_else(|| wrong(first, format!("unknown kind {kind}")))?;
     check_rate(first, &measurement)?;
     let nominal = nominal(rig, &measurement);
-    if measurement
-        .recordings
-        .iter()
-        .map(RigRecording::len)
-        .sum::<usize>()
-        > LONG
-    {
+    let samples = measurement.recordings.iter().map(RigRecording::len);
+    if samples.sum::<usize>() > LONG {
         guessing.rate = ENOUGH_OF_LONG;
     }
     let text = guessing.text(&nominal);

@@ -221,7 +221,7 @@ pub fn relations(recording: &Recording, nominal: &Nominal) -> Vec<Relation> {
             along += (error(k, Complex::new(0.0, omega(k))).0 * x[k].conj()).re;
             size += x[k].norm_sqr();
         }
-        let pitch = (along / size).clamp(-MOST_PITCH, MOST_PITCH);
+        let pitch = (along / size.max(f64::MIN_POSITIVE)).clamp(-MOST_PITCH, MOST_PITCH);
         let level = |k: usize, s: Complex<f64>| (error(k, s).0 - x[k] * pitch, 1.0);
         all.push(Relation {
             name: KINEMATICS,
