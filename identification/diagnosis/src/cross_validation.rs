@@ -781,21 +781,18 @@ mod tests {
 
     impl Halves {
         fn new(effects: &[&'static str], left: fn(&Point, usize, usize) -> f64) -> Self {
-            let candidate = |effect: &&'static str| Candidate {
-                effect,
-                parameters: vec![EffectParameter {
-                    name: "size",
-                    unit: "1",
-                    scale: Scale::Linear(1.0),
-                    role: Role::Size { weak: 0.1 },
-                    bounds: (-50.0, 50.0),
-                }],
-                starts: vec![vec![0.5]],
-                look_alikes: &[],
-                tolerance: 1.0,
-                contains: None,
-                law: "",
-                is_linear: false,
+            let candidate = |effect: &&'static str| {
+                Candidate::new(
+                    effect,
+                    vec![EffectParameter {
+                        name: "size",
+                        unit: "1",
+                        scale: Scale::Linear(1.0),
+                        role: Role::Size { weak: 0.1 },
+                        bounds: (-50.0, 50.0),
+                    }],
+                    vec![vec![0.5]],
+                )
             };
             let candidates = effects.iter().map(candidate).collect();
             Self {

@@ -535,16 +535,7 @@ mod tests {
                 bounds: (0.0, 5.0),
             };
             Self {
-                candidates: vec![Candidate {
-                    effect: "drift",
-                    parameters: vec![drift],
-                    starts: vec![vec![0.5]],
-                    look_alikes: &[],
-                    tolerance: 1.0,
-                    contains: None,
-                    law: "",
-                    is_linear: false,
-                }],
+                candidates: vec![Candidate::new("drift", vec![drift], vec![vec![0.5]])],
                 measured,
             }
         }

@@ -540,16 +540,7 @@ mod tests {
             role: Role::Size { weak: 2.0 },
             bounds: (-10.0, 10.0),
         };
-        Candidate {
-            effect: "effect",
-            parameters: vec![size; sizes],
-            starts: Vec::new(),
-            look_alikes: &[],
-            tolerance: 1.0,
-            contains: None,
-            law: "",
-            is_linear: false,
-        }
+        Candidate::new("effect", vec![size; sizes], Vec::new())
     }
 
     fn with(effects: &[(usize, &[f64])]) -> Point {

@@ -213,6 +213,24 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// An effect on a law of its own that looks like no other, with values (SI) from which fits begin.
+    pub const fn new(
+        effect: &'static str,
+        parameters: Vec<EffectParameter>,
+        starts: Vec<Vec<f64>>,
+    ) -> Self {
+        Self {
+            effect,
+            parameters,
+            starts,
+            look_alikes: &[],
+            tolerance: 1.0,
+            contains: None,
+            law: "",
+            is_linear: false,
+        }
+    }
+
     /// Values (SI) of internal coordinates.
     pub fn values(&self, internal: &[f64]) -> Vec<f64> {
         let pairs = self.parameters.iter().zip(internal);
@@ -343,22 +361,17 @@ mod tests {
     use super::*;
 
     fn candidate(bounds: (f64, f64), scale: Scale) -> Candidate {
-        Candidate {
-            effect: "effect",
-            parameters: vec![EffectParameter {
+        Candidate::new(
+            "effect",
+            vec![EffectParameter {
                 name: "size",
                 unit: "1",
                 scale,
                 role: Role::Size { weak: 1.0 },
                 bounds,
             }],
-            starts: Vec::new(),
-            look_alikes: &[],
-            tolerance: 1.0,
-            contains: None,
-            law: "",
-            is_linear: false,
-        }
+            Vec::new(),
+        )
     }
 
     #[test]

@@ -32,19 +32,14 @@ impl Waves {
             typical: 1.0,
             spread: 0.5,
         };
-        let candidates = vec![Candidate {
-            effect: "decay",
-            parameters: vec![
+        let candidates = vec![Candidate::new(
+            "decay",
+            vec![
                 parameter("size", role, (-10.0, 10.0)),
                 parameter("rate", rate, (0.1, 3.0)),
             ],
-            starts: Vec::new(),
-            look_alikes: &[],
-            tolerance: 1.0,
-            contains: None,
-            law: "",
-            is_linear: false,
-        }];
+            Vec::new(),
+        )];
         let other = |k: usize| (1.7 * k as f64).sin() + 0.3 * (0.9 * k as f64).cos();
         let measured = (0..records)
             .map(|record| {

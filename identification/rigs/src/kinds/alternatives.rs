@@ -2,7 +2,7 @@
 //! another of its class, and without what is not needed.
 
 use super::PartReport;
-use super::confirmed::{clearly_better, lengths, unfit, without_effect};
+use super::confirmed::{NEAR, clearly_better, lengths, unfit, without_effect};
 use super::parts::{EVERYTHING, InParts};
 use super::readings::{Crossed, NEEDED, likelier};
 use diagnosis::{Observer, Point, all_errors, looked, refit, settled, squares};
@@ -17,8 +17,6 @@ const ALMOST: f64 = 3.0;
 const BEHIND: f64 = 2.0;
 /// Error on all data over that of the likeliest model that is slightly more.
 const SLIGHTLY: f64 = 1.2;
-/// Error, over the output, that tells nothing of that: without noise a fit that is nearly there is far off.
-const LITTLE: f64 = 0.01;
 
 /// What the two parts ask for, each alone and both together, of effects that cannot be told apart one; each also
 /// from the stated nominal values.
@@ -117,7 +115,7 @@ pub(super) fn of_its_class<M: InParts>(
     let best = all.swap_remove(best);
     all.retain(|own| replaced(&best.point, &own.point).is_some());
     let error = |own: &Rival| measured.normalised_error(&own.point, EVERYTHING);
-    let most = (SLIGHTLY * error(&best)).min(LITTLE);
+    let most = (SLIGHTLY * error(&best)).min(NEAR);
     let is_near =
         |(by, own): &(f64, Rival)| *by < NEARLY || own.fits_better_than(&best) || error(own) < most;
     let behind = all.into_iter().map(|own| (best.likelier_than(&own), own));
@@ -207,7 +205,8 @@ pub(super) fn simplest<M: InParts>(
         Some((error(&found), found))
     });
     let (near, best) = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if near > (ALMOST * most).max(LITTLE) {
+    // Without noise a fit that is nearly there is far off.
+    if near > (ALMOST * most).max(NEAR) {
         return None;
     }
     let best = settled(measured, &best, EVERYTHING)?;

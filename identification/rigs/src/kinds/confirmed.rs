@@ -17,10 +17,10 @@ use diagnosis::{
 };
 use recordings::mean_and_deviation;
 
-/// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times
-/// these, or this small.
+/// Error of a model, over the output, that leaves nothing to explain.
+pub(super) const NEAR: f64 = 0.01;
+/// Errors on data that were not fitted that still agree with those on fitted ones: at most so many times these.
 const AGREE: f64 = 2.0;
-const NEAR: f64 = 0.01;
 /// A parameter differs between parts where its estimates lie this many of their standard errors
 /// apart. Some twenty are compared.
 const DIFFERS: f64 = 3.5;

@@ -1,6 +1,6 @@
 //! The diagnosis of a rig on real data.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -9,8 +9,8 @@ use super::alternatives::{
 };
 use super::cause::{Cause, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
-    Confirmed, NominalFits, Refused, TOO_SMALL, agrees, confirm, effects as named_values, is_vital,
-    lengths, needed, unfit, without_effect,
+    Confirmed, NEAR, NominalFits, Refused, TOO_SMALL, agrees, confirm, effects as named_values,
+    is_vital, lengths, needed, unfit,
 };
 use super::measured::Measured;
 use super::named_value::NamedValue;
@@ -37,8 +37,6 @@ const UNUSED: &str = "the prediction of the other part is better without it";
 const AS_WELL: f64 = 1.02;
 /// Error of a model, over the output, that leaves nothing to doubt in how the output is measured.
 const SMALL: f64 = 0.05;
-/// And that leaves nothing to explain, where each part is predicted from the other.
-const EXACT: f64 = 0.01;
 /// Share of the described model's squared error that is nothing to explain.
 const NOTHING: f64 = 1e-3;
 /// Share of the squared error beyond which what is explained is all of it.
@@ -460,7 +458,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         .filter(|cause| tells || cause.deviations() > FAR)
         .partition(Cause::is_clear);
     causes.extend(clear);
-    let leaves_nothing = tests.into_iter().all(|(error, _)| error < EXACT);
+    let leaves_nothing = tests.into_iter().all(|(error, _)| error < NEAR);
     let is_answered = !confirmed.effects.is_empty() || !causes.is_empty() || leaves_nothing;
     // What was found and is not named is ranked.
     if !is_answered && !observer.is_over() {
@@ -474,7 +472,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     matter.retain(|own| own.objection.as_deref() != Some(TOO_SMALL) && own.share > NOTHING);
     let verdict = match (named.is_empty() || !confirmed.pays, rivalled) {
         (true, _) if !causes.is_empty() => Verdict::Named,
-        (true, _) if (matter.is_empty() || leaves_nothing) && holds => Verdict::Adequate,
+        (true, _) if leaves_nothing || (matter.is_empty() && holds) => Verdict::Adequate,
         (true, _) => Verdict::Unexplained,
         (_, true) => Verdict::Ambiguous,
         _ => Verdict::Named,
@@ -525,19 +523,18 @@ fn readings<M: InParts>(
 
 /// The models of different effects among those `proposed`, fitted to all data, without effects that these do not show.
 fn unnamed<M: InParts>(measured: &M, proposed: [&Point; 3]) -> Vec<Weighed> {
-    let mut known: Vec<Vec<usize>> = vec![Vec::new()];
+    let mut known = BTreeSet::from([BTreeSet::new()]);
     let weighed = proposed.into_iter().filter_map(|point| {
         let (found, deviations) = refit(measured, point, EVERYTHING)?;
+        let refused = unfit(measured, &found.point, &deviations, EVERYTHING);
         let mut shown = found.point;
-        for (effect, _) in unfit(measured, &shown.clone(), &deviations, EVERYTHING) {
-            shown = without_effect(&shown, effect);
-        }
-        let mut own: Vec<usize> = shown.effects.iter().map(|(i, _)| *i).collect();
-        own.sort_unstable();
-        if known.contains(&own) {
+        shown
+            .effects
+            .retain(|(i, _)| refused.iter().all(|(gone, _)| gone != i));
+        let own: BTreeSet<usize> = shown.effects.iter().map(|(i, _)| *i).collect();
+        if !known.insert(own) {
             return None;
         }
-        known.push(own);
         let crossed = Crossed::of(measured, &shown)?;
         Weighed::of(measured, &shown, crossed)
     });

@@ -175,14 +175,12 @@ pub fn effect<const N: usize>(
     };
     Effect {
         candidate: Candidate {
-            effect,
-            parameters: parameters.iter().map(parameter).collect(),
-            starts: starts.iter().map(|start| start.to_vec()).collect(),
             look_alikes,
-            tolerance: 1.0,
-            contains: None,
-            law: "",
-            is_linear: false,
+            ..Candidate::new(
+                effect,
+                parameters.iter().map(parameter).collect(),
+                starts.iter().map(|start| start.to_vec()).collect(),
+            )
         },
         off: parameters.iter().map(|(_, entry)| entry.off).collect(),
         about: about.trim(),

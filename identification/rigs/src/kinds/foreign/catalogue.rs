@@ -178,9 +178,9 @@ fn candidate(
     bounds: (f64, f64),
     starts: Vec<Vec<f64>>,
 ) -> Candidate {
-    Candidate {
+    Candidate::new(
         effect,
-        parameters: vec![EffectParameter {
+        vec![EffectParameter {
             name,
             unit: "",
             scale,
@@ -188,12 +188,7 @@ fn candidate(
             bounds,
         }],
         starts,
-        look_alikes: &[],
-        tolerance: 1.0,
-        contains: None,
-        law: "",
-        is_linear: false,
-    }
+    )
 }
 
 /// How far a signal goes in the records.

@@ -287,14 +287,8 @@ impl Compiled {
     pub fn effect(&self) -> Effect {
         Effect {
             candidate: Candidate {
-                effect: self.effect,
-                parameters: self.parameters.clone(),
-                starts: self.starts.clone(),
                 look_alikes: self.look_alikes,
-                tolerance: 1.0,
-                contains: None,
-                law: "",
-                is_linear: false,
+                ..Candidate::new(self.effect, self.parameters.clone(), self.starts.clone())
             },
             off: self.off.clone(),
             about: self.about,
