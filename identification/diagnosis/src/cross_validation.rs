@@ -13,8 +13,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::least_squares::{
-    Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, solution,
-    squares,
+    Columns, Free, SimulatedModel, Solution, all_errors, deviations, least_squares, polished,
+    solution, squares,
 };
 use super::model::Point;
 use super::opening::opened;
@@ -119,6 +119,11 @@ pub fn settled<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Op
     least_squares(model, start, record, &Free::All, TO_THE_END).map(|found| found.point)
 }
 
+/// As [`settled`], also along a valley.
+pub fn settled_along<M: SimulatedModel>(model: &M, start: &Point, record: usize) -> Option<Point> {
+    polished(model, start, record, TO_THE_END).map(|found| found.point)
+}
+
 /// `point` with the nuisance as stated but for what differs from block to block.
 pub fn as_stated<M: SimulatedModel>(model: &M, point: &Point) -> Point {
     let mut stated = point.clone();
@@ -140,6 +145,17 @@ pub fn refit<M: SimulatedModel>(
     record: usize,
 ) -> Option<(Simulated, Vec<f64>)> {
     let found = least_squares(model, start, record, &Free::All, TO_THE_END)?;
+    let deviations = deviations(model, &found, record).unwrap_or_default();
+    Some((found.into(), deviations))
+}
+
+/// As [`refit`], also along a valley.
+pub fn refit_along<M: SimulatedModel>(
+    model: &M,
+    start: &Point,
+    record: usize,
+) -> Option<(Simulated, Vec<f64>)> {
+    let found = polished(model, start, record, TO_THE_END)?;
     let deviations = deviations(model, &found, record).unwrap_or_default();
     Some((found.into(), deviations))
 }

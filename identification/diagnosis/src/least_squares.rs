@@ -21,6 +21,8 @@ const DIFFERENCE: (f64, f64, f64) = (4e-3, 1e-3, 1e-4);
 const LONGEST_STEP: f64 = 6.0;
 /// Gain in twice the logarithm of the likelihood below which a fit has settled.
 const STILL: f64 = 0.3;
+/// Most steps with derivatives to both sides.
+const POLISHING: usize = 8;
 /// Correlated samples that count as one in it, at most.
 const LARGEST_TIME: f64 = 20.0;
 /// Share of the squared change of the errors up to which derivatives may miss it and are still learned from it.
@@ -280,12 +282,6 @@ pub fn least_squares<M: SimulatedModel>(
     iterations: usize,
 ) -> Option<Solution> {
     let start = solution(model, start, record)?;
-    let mut fit = Fit {
-        model,
-        record,
-        free,
-        own: Vec::new(),
-    };
     let search = Search {
         first: 1e-4,
         tries: [8, 2],
@@ -293,7 +289,28 @@ pub fn least_squares<M: SimulatedModel>(
         iterations,
         ..Search::default()
     };
+    let mut fit = Fit::new(model, record, free, false);
     let found = minimise(&mut fit, start, &search).ok()?;
+    Some(found.place)
+}
+
+/// Fits `start` to `record` to the end, also along a valley, in which difference quotients to one side are as large as
+/// the slope.
+pub fn polished<M: SimulatedModel>(
+    model: &M,
+    start: &Point,
+    record: usize,
+    iterations: usize,
+) -> Option<Solution> {
+    let near = least_squares(model, start, record, &Free::All, iterations)?;
+    let search = Search {
+        first: 1e-6,
+        tries: [8, 2],
+        iterations: POLISHING,
+        ..Search::default()
+    };
+    let mut fit = Fit::new(model, record, &Free::All, true);
+    let found = minimise(&mut fit, near, &search).ok()?;
     Some(found.place)
 }
 
@@ -304,9 +321,21 @@ struct Fit<'a, M> {
     free: &'a Free<'a>,
     /// Derivatives that are not held.
     own: Vec<Vec<f64>>,
+    /// Whether differences are to both sides.
+    is_central: bool,
 }
 
-impl<M: SimulatedModel> Fit<'_, M> {
+impl<'a, M: SimulatedModel> Fit<'a, M> {
+    fn new(model: &'a M, record: usize, free: &'a Free<'a>, is_central: bool) -> Self {
+        Self {
+            model,
+            record,
+            free,
+            own: Vec::new(),
+            is_central,
+        }
+    }
+
     fn held(&self) -> &[Vec<f64>] {
         match self.free {
             Free::Frozen(columns) => &columns.columns,
@@ -317,7 +346,7 @@ impl<M: SimulatedModel> Fit<'_, M> {
     fn fresh(&self, at: &Solution) -> Option<Vec<Vec<f64>>> {
         let own = (self.held().len()..coordinates(&at.point)).map(|i| match self.free {
             Free::Chosen(chosen) if !chosen(i) => Some(vec![0.0; at.errors.len()]),
-            _ => column(self.model, at, self.record, i, false),
+            _ => column(self.model, at, self.record, i, self.is_central),
         });
         own.collect()
     }
@@ -388,7 +417,7 @@ impl<M: SimulatedModel> Problem for Fit<'_, M> {
         taken: &Taken<'_, Solution>,
     ) -> bool {
         // Beside derivatives that are held, those that are not are few.
-        let learns = self.held().is_empty();
+        let learns = self.held().is_empty() && !self.is_central;
         learns && learn(&mut self.own, &quadratic.information, from, taken.place)
     }
 }

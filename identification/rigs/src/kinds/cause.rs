@@ -10,6 +10,9 @@ pub const INTERVAL_95: f64 = 1.96;
 /// that of a singular fit, while a value near zero with an ordinary interval is an answer.
 const WIDE: f64 = 100.0;
 
+/// Stated deviations from which on a parameter is not what was stated.
+pub(super) const FROM: f64 = 2.0;
+
 /// Integral over proportional gain, 1/s, below which it makes up for nothing during a record: it takes minutes.
 const SLOW: f64 = 2e-3;
 
@@ -32,7 +35,7 @@ impl Cause {
 
     /// As [`Self::of`], where it may be chance.
     pub(super) fn perhaps(found: NamedValue, (stated, stated_within): (f64, f64)) -> Option<Self> {
-        let is_off = (found.value - stated).abs() > 2.0 * stated_within;
+        let is_off = (found.value - stated).abs() > FROM * stated_within;
         is_off.then_some(Self { found, stated })
     }
 
@@ -41,15 +44,16 @@ impl Cause {
         self.deviations() > 2.5
     }
 
-    /// Probability that a share of this size is off by as much as rigs are and not by chance, either as likely
-    /// before the data.
+    /// Probability that it is off by as much as rigs are and not by chance, either as likely before the data.
     pub(super) fn weight(&self) -> f64 {
-        // Standard deviation of the shares by which what is off is off.
-        const OFF: f64 = 0.1;
+        // Standard deviation of the shares, and of the delays in s, by which what is off is off.
+        const SHARE: f64 = 0.1;
+        const LATE: f64 = 0.01;
+        let usual = if self.found.unit == "s" { LATE } else { SHARE };
         let error = self.found.standard_error;
         let off = self.found.value - self.stated;
         let density = |deviation: f64| (-0.5 * (off / deviation).powi(2)).exp() / deviation;
-        let [chance, fault] = [density(error), density(error.hypot(OFF))];
+        let [chance, fault] = [density(error), density(error.hypot(usual))];
         fault / (fault + chance)
     }
 
@@ -60,6 +64,11 @@ impl Cause {
             self.found.value = low + half;
             self.found.standard_error = half / INTERVAL_95;
         }
+    }
+
+    /// Whether data leave open, from `low` to `high`, that it is as rigs without a fault are, `within` of what was stated.
+    pub(super) fn is_usual(&self, (low, high): (f64, f64), within: f64) -> bool {
+        low < self.stated + within && high > self.stated - within
     }
 
     /// Standard errors between what was found and what was stated.
@@ -140,9 +149,12 @@ pub(super) fn effect_in_words(name: &str, values: &[NamedValue]) -> String {
             }
             _ => format!("{name} ({})", own(one)),
         },
-        many => {
-            let all: Vec<String> = many
-                .iter()
+        [size, details @ ..] => {
+            // Details that data do not tell are of no use to a reader.
+            let holds_zero = |p: &&NamedValue| p.value.abs() <= INTERVAL_95 * p.standard_error;
+            let told = details.iter().filter(|p| !holds_zero(p));
+            let all: Vec<String> = std::iter::once(size)
+                .chain(told)
                 .map(|p| format!("{} {}", p.name.replace('_', " "), own(p)))
                 .collect();
             format!("{name} ({})", all.join(", "))

@@ -37,6 +37,10 @@ const FINE: f64 = 0.25;
 const MOST_STEPS: f64 = 16.0;
 /// The fewest: between samples the command follows a curve, and friction is even over a step.
 const SMOOTH: f64 = 2.0;
+const RAILED: f64 = 4.0;
+/// Share of the damping that the controller feeds back, where a search begins, and the most.
+const FED_BACK: f64 = 0.02;
+const MOST_FED_BACK: f64 = 0.9;
 /// Integral below which it does not make up for a spring, 1/s: gain and scale are then those of a table that the
 /// spring holds back.
 const SLOW: f64 = 0.1;
@@ -112,10 +116,12 @@ effects! {
     flow_saturation: FlowSaturation {
         compression: size("s/m", 0.01, (0.0, 5.0)),
     } from [[0.05]], like ["speed_limit"];
-    /// What drives the table is at its rail: |x'| is 1 / r at most.
+    /// What drives the table is at its rail: |x'| is 1 / r at most. Of the damping `d` the controller feeds back the share
+    /// `s` as acceleration, which ends there.
     speed_limit: SpeedLimit {
         slowness: size("s/m", 0.1, (0.0, 50.0)),
-    } from [[1.0], [2.5]], like ["flow_saturation"];
+        fed_back: shape("1", FED_BACK, 1.0),
+    } from [[1.0, FED_BACK], [2.5, FED_BACK]], like ["flow_saturation"];
     /// Transducer: y = x (1 + c x).
     sensor_curvature: SensorCurvature {
         curvature: size("1/m", 3e-3, (-0.3, 0.3)),
@@ -167,7 +173,7 @@ impl Equations for ClosedLoopActuator {
             .collect();
         let speeds = speeds(recording.output(), &places);
         let fastest = speeds.map(|(_, most)| most).filter(|most| *most > 0.0);
-        let start = fastest.map(|most| ("speed_limit", vec![recording.period() / most]));
+        let start = fastest.map(|most| ("speed_limit", vec![recording.period() / most, FED_BACK]));
         start.into_iter().collect()
     }
 
@@ -193,7 +199,7 @@ impl Equations for ClosedLoopActuator {
                 nominal.resonance_damping,
             ],
             session: vec![0.0],
-            effect: Some(("speed_limit", vec![samples * recording.period()])),
+            effect: Some(("speed_limit", vec![samples * recording.period(), FED_BACK])),
         });
         begun.into_iter().collect()
     }
@@ -303,7 +309,7 @@ impl Equations for ClosedLoopActuator {
                 time_constant: valve,
             },
             flow_saturation: FlowSaturation { compression },
-            speed_limit: SpeedLimit { slowness },
+            speed_limit: SpeedLimit { slowness, fed_back },
             sensor_curvature: SensorCurvature { curvature },
             free_play: FreePlay { gap },
             shared_disturbance: SharedDisturbance { coupling },
@@ -338,6 +344,11 @@ impl Equations for ClosedLoopActuator {
             spring_droop,
             resonance,
             resonance_damping,
+            fed_back: if slowness > 0.0 {
+                fed_back.min(MOST_FED_BACK)
+            } else {
+                0.0
+            },
             friction,
         };
         let fastest = if slowness > 0.0 {
@@ -353,7 +364,13 @@ impl Equations for ClosedLoopActuator {
             SMOOTH
         } else {
             let most = gain * (1.0 + asymmetry.abs());
-            (sample * most / FINE).ceil().clamp(SMOOTH, MOST_STEPS)
+            // What is fed back at a rail runs straight over a step.
+            let smooth = if slowness > 0.0 {
+                (sample / resonance).ceil().clamp(SMOOTH, RAILED)
+            } else {
+                SMOOTH
+            };
+            (sample * most / FINE).ceil().clamp(smooth, MOST_STEPS)
         };
         let step = form.step(sample / steps, sample);
         let at = |place: f64| held * (scale * between(loop_input, place - delay) + offset);
@@ -503,7 +520,10 @@ mod tests {
                 ..proportional(gain)
             };
             let off = Effects {
-                speed_limit: SpeedLimit { slowness: rail },
+                speed_limit: SpeedLimit {
+                    slowness: rail,
+                    fed_back: 0.0,
+                },
                 ..Effects::off().unwrap()
             };
             let out = answer(rate, &ramp, &nominal, &off);
@@ -643,6 +663,7 @@ mod tests {
             };
             let limited = SpeedLimit {
                 slowness: constant / rail,
+                fed_back: 0.0,
             };
             let effects = Effects {
                 speed_limit: limited,
@@ -663,6 +684,75 @@ mod tests {
         }
         assert!(off(0.8, 0.0, never) > 0.02);
         assert!(off(0.0, 0.0, never) < 1e-3);
+    }
+
+    #[test]
+    fn feedback_of_the_acceleration_ends_at_the_rail() {
+        // L i' = u - R i - b v, m v' = b i - F tanh(v / s), u = k (r - x) + f r' - A v' within a rail, by small steps of
+        // its own.
+        let (mass, resistance, inductance, constant) = (20.0, 1.0, 2e-3, 80.0);
+        let (gain, ahead, held, sliding_speed, fed_back) = (30.0, 0.85, 2e-4, 2e-3, 0.4);
+        // Without what is fed back.
+        let (own_lag, force) = (
+            mass * resistance / (constant * constant),
+            held * gain * constant * constant / resistance,
+        );
+        let lag = own_lag / (1.0 - fed_back);
+        let (rate, n, steps) = (200.0, 2000, 400);
+        let wave = |t: f64| 0.02 * (3.0 * t).sin() + 0.01 * (23.0 * t).sin();
+        let slope = |t: f64| 0.06 * (3.0 * t).cos() + 0.23 * (23.0 * t).cos();
+        let command: Vec<f64> = (0..n).map(|k| wave(k as f64 / rate)).collect();
+        let measured = |rail: f64, force: f64| {
+            let (mut current, mut x, mut v, mut acceleration) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            let h = 1.0 / rate / f64::from(steps);
+            let mut measured = Vec::new();
+            for k in 0..n {
+                measured.push(x);
+                for part in 0..steps {
+                    let t = k as f64 / rate + f64::from(part) * h;
+                    let asked =
+                        gain * (wave(t) - x) + ahead * slope(t) - fed_back * lag * acceleration;
+                    let voltage = constant * asked.clamp(-rail, rail);
+                    current += h * (voltage - resistance * current - constant * v) / inductance;
+                    let rubbed = force * (v / sliding_speed).tanh();
+                    acceleration = (constant * current - rubbed) / mass;
+                    v += h * acceleration;
+                    x += h * v;
+                }
+            }
+            measured
+        };
+        let resonance = (mass * inductance).sqrt() / constant;
+        let nominal = Nominal {
+            resonance,
+            resonance_damping: 0.5 * lag / resonance,
+            feedforward: ahead,
+            ..proportional(gain)
+        };
+        let off = |fed_back: f64, rail: f64, held: f64| {
+            let effects = Effects {
+                speed_limit: SpeedLimit {
+                    slowness: 1.0 / rail,
+                    fed_back,
+                },
+                friction: Friction {
+                    breakaway_error: held,
+                    sliding_speed,
+                },
+                ..Effects::off().unwrap()
+            };
+            let out = answer(rate, &command, &nominal, &effects);
+            let measured = measured(rail, force * f64::from(held > 0.0));
+            let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
+            let size: f64 = measured.iter().map(|x| x * x).sum();
+            (errors.sum::<f64>() / size).sqrt()
+        };
+        let (never, often) = (1e3, 0.1);
+        for held in [0.0, held] {
+            assert!(off(fed_back, never, held) < 1e-4);
+            assert!(off(fed_back, often, held) < 1e-3);
+            assert!(off(0.0, often, held) > 2e-3);
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::alternatives::{
     Item, least_needed, nearly_without, of_its_class, proposals, replaced, simplest,
 };
-use super::cause::{Cause, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
+use super::cause::{Cause, FROM, INTERVAL_95, effect_in_words, in_own_words, joined, undetermined};
 use super::confirmed::{
     Confirmed, NEAR, NominalFits, Refused, TOO_SMALL, agrees, confirm, effects as named_values,
     is_vital, lengths, needed, unfit,
@@ -15,7 +15,7 @@ use super::confirmed::{
 use super::measured::Measured;
 use super::named_value::NamedValue;
 use super::parts::{EVERYTHING, InParts, LOST, Part};
-use super::profile::{self, Open};
+use super::profile::{self, Open, Profiled};
 use super::readings::{Crossed, Reading, Weighed, in_words, instead, ranked, with_and_without};
 use super::{Description, DescriptionError, Measurement};
 use crate::report::ends_or_not_a_number;
@@ -393,15 +393,29 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let mut profiled = None;
     let mut causes: Vec<Cause> = Vec::new();
     let mut doubted: Vec<Cause> = Vec::new();
+    let mut hidden: Vec<Cause> = Vec::new();
     for i in (0..confirmed.parameters.len()).filter(|i| measured.is_cause(*i)) {
         let stated = measured.stated(i);
-        let fitted = NamedValue {
+        let mut fitted = NamedValue {
             standard_error: confirmed.of_the_fit[i],
             ..confirmed.parameters[i].clone()
         };
+        if Cause::of(fitted.clone(), stated).is_none()
+            && !measured.is_of_first_file(i)
+            && holds
+            && !observer.is_over()
+        {
+            let profiled =
+                profiled.get_or_insert_with(|| profile::beside(measured, &confirmed.point));
+            if let Some(own) = profiled {
+                hidden.extend(beyond(own, i, &fitted, stated, &confirmed.parameters));
+                fitted.value = own.value(i).unwrap_or(fitted.value);
+            }
+        }
         let Some(mut told) = Cause::of(fitted, stated) else {
             continue;
         };
+        hidden.retain(|own| own.found.name != told.found.name);
         if !believed(i, &told) || told.makes_up(&confirmed.parameters) {
             continue;
         }
@@ -417,9 +431,16 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             told.widen((low, high));
             let farthest = (own.value - low).max(high - own.value);
             own.standard_error = own.standard_error.max(farthest / INTERVAL_95);
-            if let Open::Stated(point) = open {
-                confirmed.widen_by(measured, &point);
-                as_stated = Some(point);
+            match open {
+                Open::Stated(point) => {
+                    confirmed.widen_by(measured, &point);
+                    as_stated = Some(point);
+                }
+                Open::Within(low, high) if told.is_usual((low, high), stated.1) => {
+                    hidden.push(told);
+                    continue;
+                }
+                Open::Within(..) => {}
             }
         }
         let without = measured.pinned(i, stated.0).and_then(|own| {
@@ -452,12 +473,13 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     // Of records that no model explains, sensors tell less too.
     let tells = holds || explains || leaves_little;
-    let (clear, suspected): (Vec<_>, Vec<_>) = measured
+    let (clear, mut suspected): (Vec<_>, Vec<_>) = measured
         .contradictions()
         .into_iter()
         .filter(|cause| tells || cause.deviations() > FAR)
         .partition(Cause::is_clear);
     causes.extend(clear);
+    suspected.extend(hidden);
     let leaves_nothing = tests.into_iter().all(|(error, _)| error < NEAR);
     let is_answered = !confirmed.effects.is_empty() || !causes.is_empty() || leaves_nothing;
     // What was found and is not named is ranked.
@@ -493,6 +515,46 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         confirmed,
         as_described,
         swapped,
+    })
+}
+
+/// Standard errors that no valley makes up for.
+const HOPELESS: f64 = 50.0;
+
+/// That the parameter `i` is farther from what was `stated` than the `found` value, which others of the `parameters` can
+/// make up for; none where the data tell that it is not.
+fn beyond<M: InParts>(
+    profiled: &mut Profiled<'_, M>,
+    i: usize,
+    found: &NamedValue,
+    (stated, within): (f64, f64),
+    parameters: &[NamedValue],
+) -> Option<Cause> {
+    [1.0, -1.0].into_iter().find_map(|side| {
+        let off = stated + side * FROM * within - found.value;
+        if off.abs() > HOPELESS * found.standard_error {
+            return None;
+        }
+        let mut cause = Cause {
+            found: NamedValue {
+                value: stated + side * FROM * within,
+                ..found.clone()
+            },
+            stated,
+        };
+        if cause.makes_up(parameters) || !profiled.may_be(i, cause.found.value) {
+            return None;
+        }
+        let far = profiled.far_end(i, cause.found.value)?;
+        let near = if profiled.may_be(i, stated) {
+            stated
+        } else {
+            found.value
+        };
+        let (low, high) = (near.min(far), near.max(far));
+        cause.found.value = 0.5 * (low + high);
+        cause.found.standard_error = 0.5 * (high - low) / INTERVAL_95;
+        Some(cause)
     })
 }
 

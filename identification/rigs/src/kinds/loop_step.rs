@@ -14,6 +14,8 @@ pub(super) struct Loop {
     pub(super) spring_droop: f64,
     pub(super) resonance: f64,
     pub(super) resonance_damping: f64,
+    /// Share of that damping which is the controller's, by feedback of the acceleration: what bounds the drive bounds it.
+    pub(super) fed_back: f64,
     pub(super) friction: Option<Rubbing>,
 }
 
@@ -21,6 +23,9 @@ pub(super) struct Loop {
 /// half of its lag; how far the bristles of friction are bent.
 pub(super) type State = [f64; WIDTH];
 const STATES: usize = 7;
+const RATE: usize = 5;
+/// Its place in what the controller sends.
+const RATE_SENT: usize = 6;
 const BENT: usize = STATES;
 /// As processors take numbers.
 pub(super) const WIDTH: usize = 8;
@@ -47,6 +52,14 @@ pub(super) struct Rubbing {
 }
 
 impl Rubbing {
+    /// What it takes at a `speed`, its bristles `bent`.
+    fn at(&self, speed: f64, bent: f64) -> f64 {
+        match self.law {
+            Law::Sliding(width) => -self.most * tanh(speed / width),
+            Law::Bristles(_) => -self.most * bent,
+        }
+    }
+
     /// What it takes of a speed that is `now` and would be `free` after a step of `length` without it, and how far its
     /// bristles, which were `bent`, are bent then, of 1. `share` is what one unit of it takes.
     fn taken(&self, speeds: [f64; 2], share: f64, bent: f64, length: f64) -> (f64, f64) {
@@ -155,11 +168,15 @@ pub(super) struct Step {
     pub(super) length: f64,
     /// The state after the step for one of everything before.
     pub(super) columns: [State; ALL],
-    /// What the controller sends, of the first four states, the command and its slope.
-    pub(super) sent: [f64; 6],
+    /// What the controller sends, of the first four states, the command, its slope and the velocity's rate.
+    pub(super) sent: [f64; 7],
     /// What it sends after the step of a flow beyond the linear one and of what friction takes.
     pub(super) sent_of_beyond: f64,
     pub(super) sent_of_rubbed: f64,
+    /// And of a slope of the flow beyond, where it feeds back.
+    sent_of_slope: f64,
+    /// And at once, of the velocity's rate.
+    sent_at_once: f64,
     /// Friction and the state that is the speed on which it acts.
     pub(super) rubbed: Option<(Rubbing, usize)>,
 }
@@ -199,27 +216,35 @@ impl Loop {
         let lag = 0.5 * self.loop_lag.max(least);
         let (command_pole, pole) = (pole(self.command_lag), pole(lag));
         let ahead = feedforward / gain;
-        // Of the first four states, the command and its slope.
+        // Of the first four states, the command, its slope and the velocity's rate.
         let error = if command_pole > 0.0 {
-            [1.0, -1.0, 0.0, 0.0, 0.0, 0.0]
+            [1.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         } else {
-            [0.0, -1.0, 0.0, 0.0, 1.0, 0.0]
+            [0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0]
         };
         let speed = if command_pole > 0.0 {
-            [-command_pole, 0.0, 0.0, 0.0, command_pole, 0.0]
+            [-command_pole, 0.0, 0.0, 0.0, command_pole, 0.0, 0.0]
         } else {
-            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+            [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]
         };
-        let mut sent: [f64; 6] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
+        let mut sent: [f64; 7] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
         sent[3] += 1.0;
+        let (own_damping, fed_back) = (
+            self.resonance_damping * (1.0 - self.fed_back),
+            2.0 * self.resonance_damping * self.fed_back,
+        );
+        if has_resonance {
+            sent[RATE_SENT] = -fed_back / gain;
+        }
         // Places of the command, its slope, the flow beyond, its slope and friction behind the states.
         let [command, slope, beyond, its_slope, friction] = std::array::from_fn(|i| STATES + i);
-        let column = |i: usize| [0, 1, 2, 3, command, slope, beyond][i];
+        let column = |i: usize| [0, 1, 2, 3, command, slope, RATE, beyond][i];
         let mut a = SMatrix::<f64, ALL, ALL>::zeros();
+        let mut sent_at_once = 0.0;
         // The spring holds the table back behind whatever bounds what is sent.
         let mut moves = sent;
         moves[1] -= self.spring_droop;
-        let flow: [f64; 7] = std::array::from_fn(|i| moves.get(i).map_or(1.0, |s| gain * s));
+        let flow: [f64; 8] = std::array::from_fn(|i| moves.get(i).map_or(1.0, |s| gain * s));
         // What the flow moves: the table itself, or the mass on the oil.
         let moved = if has_resonance { 5 } else { 1 };
         let share = if has_resonance {
@@ -237,7 +262,7 @@ impl Loop {
         for (i, value) in flow.into_iter().enumerate() {
             let place = column(i);
             if pole > 0.0 {
-                a[(6, place)] = pole * value;
+                a[(6, place)] += pole * value;
             } else {
                 a[(moved, place)] += share * value;
             }
@@ -253,11 +278,16 @@ impl Loop {
         }
         if has_resonance {
             // On the mass: what it takes of a steady speed is lost in the damping (a leak, a coil's resistance).
-            a[(4, friction)] = 0.5 * share / self.resonance_damping.max(LEAST_DAMPING);
+            let per_friction = 0.5 / own_damping.max(LEAST_DAMPING);
+            a[(4, friction)] = share * per_friction;
             a[(1, 4)] = 1.0;
             a[(4, 5)] = share;
             a[(5, 4)] -= share;
-            a[(5, 5)] -= 2.0 * self.resonance_damping * share;
+            a[(5, 5)] -= 2.0 * own_damping * share;
+            // The velocity's rate is less by what friction takes.
+            let (into, by) = if pole > 0.0 { (6, pole) } else { (5, share) };
+            a[(into, friction)] -= by * fed_back * per_friction;
+            sent_at_once = -fed_back * per_friction / gain;
         }
         a[(command, slope)] = 1.0;
         a[(beyond, its_slope)] = 1.0;
@@ -267,7 +297,10 @@ impl Loop {
         } else {
             a.map(|_| f64::NAN)
         };
-        let sent_of = |j: usize| -> f64 { (0..4).map(|i| sent[i] * solution[(i, j)]).sum() };
+        let sent_of = |j: usize| -> f64 {
+            let first: f64 = (0..4).map(|i| sent[i] * solution[(i, j)]).sum();
+            first + sent[RATE_SENT] * solution[(RATE, j)]
+        };
         Step {
             length,
             columns: std::array::from_fn(|j| {
@@ -275,7 +308,13 @@ impl Loop {
             }),
             sent,
             sent_of_beyond: sent_of(beyond),
-            sent_of_rubbed: sent_of(friction),
+            sent_of_rubbed: sent_of(friction) + sent_at_once,
+            sent_of_slope: if sent[RATE_SENT] == 0.0 {
+                0.0
+            } else {
+                sent_of(its_slope)
+            },
+            sent_at_once,
             rubbed: self
                 .friction
                 .map(|own| (own, if has_resonance { 4 } else { 2 })),
@@ -307,17 +346,23 @@ impl Step {
         }
         let sent = |state: &State, command: f64, slope: f64| -> f64 {
             let own: f64 = (0..4).map(|i| self.sent[i] * state[i]).sum();
-            own + self.sent[4] * command + self.sent[5] * slope
+            own + self.sent[4] * command + self.sent[5] * slope + self.sent[RATE_SENT] * state[RATE]
         };
         if let Some(beyond) = beyond {
             let [begin, end] = course.ends;
-            let now = beyond(sent(&state, begin, course.slope));
+            let rubs = self.rubbed.as_ref();
+            let rubs = rubs.map_or(0.0, |(own, at)| own.at(state[*at], state[BENT]));
+            let now = beyond(sent(&state, begin, course.slope) + self.sent_at_once * rubs);
             let mut sends = sent(&after, end, course.slope) + now * self.sent_of_beyond;
             if let Some((own, at)) = &self.rubbed {
                 let free = after[*at] + now * beyond_column[*at];
                 sends += self.sent_of_rubbed * rub(own, *at, free).0;
             }
-            let its_slope = (beyond(sends) - now) / self.length;
+            let mut its_slope = (beyond(sends) - now) / self.length;
+            if self.sent_of_slope != 0.0 {
+                let again = sends + its_slope * self.sent_of_slope;
+                its_slope = (beyond(again) - now) / self.length;
+            }
             add(&mut after, beyond_column, now);
             add(&mut after, slope_column, its_slope);
         }
@@ -352,6 +397,7 @@ mod tests {
             spring_droop: 0.05,
             resonance: 0.004,
             resonance_damping: 0.3,
+            fed_back: 0.2,
             friction: None,
         };
         let (length, share, slope) = (0.01, 0.3, 7.0);

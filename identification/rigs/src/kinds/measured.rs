@@ -583,6 +583,12 @@ impl InParts for Measured<'_> {
             && session.any(|own| own.role == SessionRole::AgainstFirst && own.unit == unit)
     }
 
+    fn at(&self, point: &Point, i: usize, value: f64) -> Option<Point> {
+        let mut there = point.clone();
+        there.nuisance[i] = self.coordinate(self.uncertain[i], value);
+        self.is_cause(i).then_some(there)
+    }
+
     fn pinned(&self, i: usize, value: f64) -> Option<Self> {
         let mut same = self.held();
         same.width = self.width;

@@ -148,6 +148,11 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         false
     }
 
+    /// `point` with that parameter at `value`; none where it is no cause.
+    fn at(&self, _point: &Point, _i: usize, _value: f64) -> Option<Point> {
+        None
+    }
+
     /// The same model with that parameter held at `value`; none where it is no cause.
     fn pinned(&self, _i: usize, _value: f64) -> Option<Self>
     where

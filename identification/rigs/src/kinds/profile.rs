@@ -4,13 +4,16 @@ use rayon::prelude::*;
 
 use super::confirmed::{clearly_better, lengths};
 use super::parts::{EVERYTHING, InParts};
-use super::readings::{FAR, NEEDED};
-use diagnosis::{Point, all_errors, looked, settled, squares};
+use super::readings::FAR;
+use diagnosis::{Point, all_errors, looked, settled, settled_along, squares};
 
-/// Share of the errors' power that is not white noise from which on a model is not exact.
-const INEXACT: f64 = 0.5;
+/// Growth of the squared error that tells nothing: no model is exact; and as a share of what is not white noise.
+const INEXACT: f64 = 0.03;
+const COLOURED: f64 = 0.2;
 /// Values that are tried to either side.
 const TRIES: usize = 4;
+/// And for what is only suspected.
+const QUICK: usize = 2;
 /// Share of a distance to which its end is found.
 const NEAR: f64 = 0.15;
 /// Share of the way between a value that agrees and one that does not which no further trial is nearer to either.
@@ -48,30 +51,22 @@ pub(super) struct Profiled<'a, M> {
     lengths: Vec<usize>,
 }
 
-/// The fit beside the model at `point`, also of what that model goes without if noise is not most of its error. None
-/// where nothing can be fitted.
+/// The best fit beside the model at `point`, also of what that model goes without. None where nothing can be fitted.
 pub(super) fn beside<'a, M: InParts>(measured: &'a M, point: &Point) -> Option<Profiled<'a, M>> {
-    let fitted = |start: &Point| {
-        let best = settled(measured, start, EVERYTHING)?;
-        Some((all_errors(measured, &best, EVERYTHING), best))
-    };
-    let (mut errors, mut best) = fitted(point)?;
     let mut starts = vec![point.clone()];
-    // Where noise is all that is left, what the model goes without is not there.
-    if coloured(&errors) > INEXACT {
-        let restored = measured.restored(point);
-        if let Some(full) = fitted(&restored)
-            && squares(&full.0) < squares(&errors)
-        {
-            (errors, best) = full;
-        }
+    let restored = measured.restored(point);
+    if restored != *point {
         starts.push(restored);
     }
+    let all = starts.par_iter();
+    let all = all.filter_map(|start| settled_along(measured, start, EVERYTHING));
+    let all = all.map(|best| (all_errors(measured, &best, EVERYTHING), best));
+    let (errors, best) = all.min_by(|a, b| squares(&a.0).total_cmp(&squares(&b.0)))?;
     Some(Profiled {
         measured,
         starts,
         best,
-        allowed: 1.0 + (NEEDED - 1.0) * coloured(&errors),
+        allowed: 1.0 + INEXACT.max(COLOURED * coloured(&errors)),
         errors,
         lengths: lengths(measured, EVERYTHING),
     })
@@ -87,11 +82,11 @@ fn coloured(errors: &[f64]) -> f64 {
 impl<M: InParts> Profiled<'_, M> {
     /// What is open of the nominal parameter `i`, which was `stated`, by the profile of the likelihood (Venzon and
     /// Moolgavkar, Applied Statistics 37, 1988), everything else fitted again. Open is where the squared error on all
-    /// data is above the least by chance, or by a tenth at most of what in it is not white noise. A standard error holds
+    /// data is above the least by chance, or by a fifth at most of what in it is not white noise. A standard error holds
     /// for a model that is exact. Where delay, lag and feedforward make up for each other, an error of the model's form
     /// counts for more than noise.
     pub(super) fn open(&self, i: usize, stated: f64) -> Option<Open> {
-        let value = self.measured.parameters(&self.best, &[]).get(i)?.value;
+        let value = self.value(i)?;
         let off = value - stated;
         Some(match self.end((i, value), -off, off.abs()) {
             (_, Some(stated)) => Open::Stated(stated),
@@ -103,15 +98,58 @@ impl<M: InParts> Profiled<'_, M> {
         })
     }
 
+    /// The best value of parameter `i`.
+    pub(super) fn value(&self, i: usize) -> Option<f64> {
+        let all = self.measured.parameters(&self.best, &[]);
+        all.get(i).map(|own| own.value)
+    }
+
+    /// Whether parameter `i` may also be at `value`. Where a model there is better than the best so far, that one is the
+    /// best from now on.
+    pub(super) fn may_be(&mut self, i: usize, value: f64) -> bool {
+        let mut starts = self.starts.clone();
+        starts.push(self.best.clone());
+        let Some((growth, is_told, there)) = self.fitted((i, value), &starts) else {
+            return false;
+        };
+        if growth < 1.0
+            && let Some(at) = self.measured.at(&there, i, value)
+            && let Some(best) = settled_along(self.measured, &at, EVERYTHING)
+        {
+            let errors = all_errors(self.measured, &best, EVERYTHING);
+            if squares(&errors) < squares(&self.errors) {
+                (self.best, self.errors) = (best, errors);
+            }
+        }
+        !is_told
+    }
+
+    /// The far end of what is open of parameter `i`, to the side of `value`.
+    pub(super) fn far_end(&self, i: usize, value: f64) -> Option<f64> {
+        let best = self.value(i)?;
+        let (far, _) = self.end_in(QUICK, (i, best), value - best, f64::INFINITY);
+        Some(best + far.copysign(value - best))
+    }
+
+    fn end(&self, of: (usize, f64), first: f64, most: f64) -> (f64, Option<Point>) {
+        self.end_in(TRIES, of, first, most)
+    }
+
     /// Distance from the `found` value of parameter `i` at which the error begins to tell, on the side of `first`, which
     /// is tried first; at `most` it ends with the model there.
-    fn end(&self, (i, found): (usize, f64), first: f64, most: f64) -> (f64, Option<Point>) {
+    fn end_in(
+        &self,
+        tries: usize,
+        (i, found): (usize, f64),
+        first: f64,
+        most: f64,
+    ) -> (f64, Option<Point>) {
         let mut starts = self.starts.clone();
         starts.push(self.best.clone());
         let (mut inside, mut outside, mut at) = (0.0f64, f64::INFINITY, first.abs());
         // Where the error is least, and what it is.
         let mut least = (0.0, 1.0);
-        for _ in 0..TRIES {
+        for _ in 0..tries {
             let value = found + at.copysign(first);
             let (growth, is_told, best) = self.fitted((i, value), &starts).unwrap_or((
                 f64::INFINITY,
@@ -238,7 +276,7 @@ mod tests {
             };
             let i = place("command_delay");
             let bare = measured.without(&measured.origin(), place("loop_lag"));
-            let point = settled(&measured, &bare.unwrap(), EVERYTHING).unwrap();
+            let point = settled_along(&measured, &bare.unwrap(), EVERYTHING).unwrap();
             let found = measured.parameters(&point, &[])[i].value;
             assert!(found > delay + 2e-3, "the lag does not matter: {found}");
             match beside(&measured, &point).unwrap().open(i, 0.0).unwrap() {
