@@ -340,3 +340,77 @@ fn connections_that_do_not_hold_are_refused_with_their_ends() {
         assert!(reason.contains(expected), "{said}");
     }
 }
+
+/// An archive whose element `reference` plays a motion: its FMU is of this model and has this motion.
+fn played(folder: &Path, model: &str, motion: Option<&str>) -> SystemFile {
+    let inner = folder.join("inner.fmu");
+    let description = format!(r#"<fmiModelDescription modelName="{model}"/>"#);
+    let mut files = vec![("modelDescription.xml", description.as_bytes())];
+    files.extend(motion.map(|text| ("resources/motion.csv", text.as_bytes())));
+    zipped(&inner, &files);
+    let structure = r#"<ssd:SystemStructureDescription version="1.0" name="pair"
+        xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"><ssd:System name="root"><ssd:Elements>
+        <ssd:Component name="reference" source="resources/R.fmu"/><ssd:Component name="a" source="resources/A.fmu"/>
+        </ssd:Elements><ssd:Connections>
+        <ssd:Connection startElement="reference" startConnector="displacement" endElement="a" endConnector="x"/>
+        <ssd:Connection startElement="reference" startConnector="velocity_before" endElement="a" endConnector="v"/>
+        </ssd:Connections></ssd:System></ssd:SystemStructureDescription>"#;
+    let path = folder.join("pair.ssp");
+    let fmu = std::fs::read(&inner).unwrap();
+    zipped(
+        &path,
+        &[
+            ("SystemStructure.ssd", structure.as_bytes()),
+            ("resources/R.fmu", &fmu),
+            ("resources/A.fmu", &fmu),
+        ],
+    );
+    fmi_ssp::read(&path.to_string_lossy()).unwrap()
+}
+
+#[test]
+fn the_motion_of_an_own_archive_becomes_the_reference_and_another_component_gives_its_name_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = |file: &SystemFile| -> Vec<String> { file.components.keys().cloned().collect() };
+    let links = |file: &SystemFile| -> Vec<String> {
+        let mut all: Vec<String> = file.connections.iter().map(ToString::to_string).collect();
+        all.sort();
+        all
+    };
+    let motion = "time,displacement,velocity,acceleration\n0,1,2,3\n0.01,4,5,6\n";
+    let own = played(folder.path(), "ReferenceMotion", Some(motion));
+    assert_eq!(names(&own), ["a"]);
+    assert_eq!(
+        links(&own),
+        [
+            "reference.displacement -> a.x",
+            "reference.velocity[-1] -> a.v"
+        ]
+    );
+    // The samples stay, under names with units.
+    let table = own.experiment.reference.clone().unwrap();
+    let table = own.directory.as_ref().unwrap().join(table);
+    assert_eq!(
+        std::fs::read_to_string(table).unwrap(),
+        "time [s],displacement [m],velocity [m/s],acceleration [m/s2]\n0,1,2,3\n0.01,4,5,6\n"
+    );
+    assert!(own.notes.is_empty(), "{:?}", own.notes);
+    for (model, motion) in [("Other", Some(motion)), ("ReferenceMotion", None)] {
+        let other = played(folder.path(), model, motion);
+        assert_eq!(names(&other), ["a", "reference_"]);
+        assert_eq!(
+            links(&other),
+            [
+                "reference_.displacement -> a.x",
+                "reference_.velocity_before -> a.v"
+            ]
+        );
+        assert_eq!(other.experiment.reference, None);
+        assert_eq!(
+            other.notes,
+            [
+                "the component `reference` is renamed `reference_`, because `reference` is the motion"
+            ]
+        );
+    }
+}

@@ -110,6 +110,8 @@ fn values_that_cannot_be_read_are_named_with_their_parameter() {
     ] {
         let told = value(folder.path(), parameter).unwrap_err();
         assert!(told.ends_with(expected), "{told}");
+        // The line of the parameter.
+        assert!(told.contains("SystemStructure.ssd:6: "), "{told}");
     }
 }
 
@@ -279,4 +281,41 @@ fn arrays_are_connected_as_a_whole_or_not_at_all() {
             "{told}"
         );
     }
+}
+
+#[test]
+fn values_of_arrays_are_written_as_a_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let array = |kind: &str, name: &str, reference: u32, start: &str, inner: &str| {
+        format!(
+            r#"<{kind} name="{name}" valueReference="{reference}" causality="parameter" variability="fixed" {start}>
+            <Dimension start="2"/>{inner}</{kind}>"#
+        )
+    };
+    let texts = r#"<Start value="one"/><Start value="two"/>"#;
+    let variables = [
+        array("Float64", "x", 1, r#"start="0 0""#, ""),
+        array("Int32", "k", 2, r#"start="7 8""#, ""),
+        array("Boolean", "on", 3, r#"start="true true""#, ""),
+        array("String", "s", 4, "", texts),
+        array("Float64", "unset", 5, r#"start="1 2""#, ""),
+    ];
+    fmu(folder.path(), "Own", &variables.concat());
+    let text = exported(
+        folder.path(),
+        "[components.a]\nfmu = \"Own.fmu\"\n[components.a.parameters]\nx = [1.5, -2.0]\nk = [3, 4]\n\
+         on = [true, false]\ns = [\"a b\", \"<c>\"]\n",
+    )
+    .unwrap();
+    let dimension = r#"<ssc:Dimension size="2"/></ssv:Parameter>"#;
+    let mut found = lines(&text, "<ssv:Parameter ");
+    found.sort_unstable();
+    let expected = [
+        r#"<ssv:Parameter name="k"><ssv:Integer value="3 4"/>"#,
+        r#"<ssv:Parameter name="on"><ssv:Boolean value="true false"/>"#,
+        r#"<ssv:Parameter name="s"><ssv:String><ssv:Value value="a b"/><ssv:Value value="&lt;c&gt;"/></ssv:String>"#,
+        r#"<ssv:Parameter name="x"><ssv:Real value="1.5 -2"/>"#,
+    ]
+    .map(|front| format!("{front}{dimension}"));
+    assert_eq!(found, expected);
 }

@@ -240,3 +240,29 @@ fn derivatives_that_are_promised_and_not_given_are_found() {
     let lines = found(&fmu);
     assert!(lines.iter().any(|line| line == promised), "{lines:#?}");
 }
+
+/// Outputs stand still before a run, so that each difference is 0 within the rounding of the output's size.
+#[test]
+fn differences_are_taken_in_proportion_to_the_input_which_gets_its_value_back() {
+    let mut fmu = counter(Fault::None);
+    let count = 2;
+    let own = Arc::make_mut(&mut fmu);
+    let output = own.description.position("count").unwrap();
+    own.description.variables[output].start = Some("3".to_string());
+    let mut instance = instance(&fmu, &Options::default()).unwrap();
+    instance.enter_initialization(0.0, 1.0).unwrap();
+    for (value, step) in [(0.0, 1e-3), (0.5, 1e-3), (-20.0, 0.02)] {
+        instance.set(&Kind::Float64, &[1], &[value]).unwrap();
+        let found = derivatives::differences(&mut instance, &[count, count], 1).unwrap();
+        assert_eq!(found.len(), 2);
+        for own in found {
+            let (derivative, uncertainty) = own.unwrap();
+            let expected = 1e4 * f64::EPSILON * 3.0 / step;
+            assert_eq!(derivative, 0.0);
+            assert!((uncertainty / expected - 1.0).abs() < 1e-9, "{uncertainty}");
+        }
+        let mut kept = [f64::NAN];
+        instance.get(&Kind::Float64, &[1], &mut kept).unwrap();
+        assert_eq!(kept, [value]);
+    }
+}
