@@ -105,7 +105,7 @@ pub unsafe fn set_debug_logging<C: Component>(
             instance
                 .log
                 .set_debug(on != 0, &categories)
-                .map_err(Fault::error)
+                .map_err(|unknown| Fault::error(unknown.to_string()))
         })
     }
 }

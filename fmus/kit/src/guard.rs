@@ -55,9 +55,14 @@ fn report<C: Component>(instance: &Instance<C>, function: &str, fault: &Fault) -
     fault.status
 }
 
+/// A panic that was caught: its message, with the place if it is known.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub(crate) struct Panic(String);
+
 /// Runs something that has no instance yet or no longer.
-pub(crate) fn catch<T>(body: impl FnOnce() -> T) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(body)).map_err(describe)
+pub(crate) fn catch<T>(body: impl FnOnce() -> T) -> Result<T, Panic> {
+    catch_unwind(AssertUnwindSafe(body)).map_err(|payload| Panic(describe(payload)))
 }
 
 static PANICS: Mutex<Vec<(ThreadId, String)>> = Mutex::new(Vec::new());
@@ -125,9 +130,10 @@ mod tests {
         assert!(
             catch(|| panic!("number {}", 7))
                 .unwrap_err()
+                .0
                 .ends_with("number 7")
         );
-        assert!(catch(|| panic!("plain")).unwrap_err().ends_with("plain"));
+        assert!(catch(|| panic!("plain")).unwrap_err().0.ends_with("plain"));
         assert_eq!(catch(|| 5), Ok(5));
     }
 

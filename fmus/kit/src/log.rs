@@ -47,6 +47,11 @@ pub const CATEGORIES: [(&CStr, &str); 3] = [
     (c"logEvents", "Changes of phase, when debug logging is on"),
 ];
 
+/// A log category that does not exist.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not a log category")]
+pub struct UnknownCategory(pub String);
+
 /// An instance's log.
 pub struct Log {
     sink: Sink,
@@ -68,14 +73,11 @@ impl Log {
     ///
     /// # Errors
     /// Names a category that does not exist.
-    pub fn set_debug(&mut self, on: bool, categories: &[&CStr]) -> Result<(), String> {
+    pub fn set_debug(&mut self, on: bool, categories: &[&CStr]) -> Result<(), UnknownCategory> {
         let events = CATEGORIES[2].0;
         for category in categories {
             if *category != c"logAll" && !CATEGORIES.iter().any(|(name, _)| name == category) {
-                return Err(format!(
-                    "`{}` is not a log category",
-                    category.to_string_lossy()
-                ));
+                return Err(UnknownCategory(category.to_string_lossy().into_owned()));
             }
         }
         let named = categories.iter().any(|c| *c == events || *c == c"logAll");
@@ -204,7 +206,8 @@ mod tests {
         let lines = Lines::default();
         let mut log = log(&lines, true);
         let error = log.set_debug(false, &[c"logEvents", c"logNothing"]);
-        assert!(error.unwrap_err().contains("`logNothing`"));
+        let told = error.unwrap_err().to_string();
+        assert_eq!(told, "`logNothing` is not a log category");
         log.event("still");
         assert_eq!(lines.lock().unwrap().len(), 1);
     }

@@ -78,7 +78,7 @@ pub unsafe fn run<C: Component>(job: *const Job) -> *mut c_char {
     match outcome {
         Ok(Ok(())) => std::ptr::null_mut(),
         Ok(Err(problem)) => c_text(&problem.to_string()).into_raw(),
-        Err(panic) => c_text(&panic).into_raw(),
+        Err(panic) => c_text(&panic.to_string()).into_raw(),
     }
 }
 

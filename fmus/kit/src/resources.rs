@@ -22,6 +22,69 @@ use crate::{
 /// The file in `resources` that replaces start values.
 pub const START_VALUES: &str = "start_values.csv";
 
+/// A file of an FMU's resources that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ResourceError {
+    /// The file is there but cannot be read.
+    #[error("{}: {source}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// The operating system's word.
+        source: io::Error,
+    },
+    /// A line of the start values that cannot be used.
+    #[error("{}:{line}: {problem}", file.display())]
+    StartValue {
+        /// The file.
+        file: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        problem: StartValueError,
+    },
+}
+
+/// What is wrong with a line of start values.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StartValueError {
+    /// A line without a comma.
+    #[error("`{0}`, expected `name,value`")]
+    NoComma(String),
+    /// A name that is not that of a parameter.
+    #[error("`{name}` is not a parameter of {component}")]
+    NotAParameter {
+        /// The name.
+        name: String,
+        /// The component.
+        component: &'static str,
+    },
+    /// A value that is not a finite number.
+    #[error("`{0}` is not a number")]
+    NotANumber(String),
+    /// A number below the minimum or above the maximum.
+    #[error("`{name}` = {value} is out of its range")]
+    OutOfRange {
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f64,
+    },
+    /// A number that is not an item of the enumeration.
+    #[error("`{name}` = {value} is none of {choices}")]
+    NotAChoice {
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// Name of the enumeration.
+        choices: &'static str,
+    },
+    /// A parameter of another type.
+    #[error("`{0}` is neither Float64 nor an enumeration")]
+    Type(String),
+}
+
 /// Where the importer says that the resources lie.
 #[derive(Debug, Clone, Copy)]
 pub enum Location<'a> {
@@ -58,7 +121,7 @@ impl Location<'_> {
 ///
 /// # Errors
 /// When the file is there but cannot be read.
-pub fn start_values(location: Location<'_>) -> Result<Option<(PathBuf, String)>, String> {
+pub fn start_values(location: Location<'_>) -> Result<Option<(PathBuf, String)>, ResourceError> {
     let Some(file) = location.folder().map(|folder| folder.join(START_VALUES)) else {
         return Ok(None);
     };
@@ -69,7 +132,7 @@ pub fn start_values(location: Location<'_>) -> Result<Option<(PathBuf, String)>,
 ///
 /// # Errors
 /// When the file is there but cannot be read.
-pub fn optional_text(file: &Path) -> Result<Option<String>, String> {
+pub fn optional_text(file: &Path) -> Result<Option<String>, ResourceError> {
     match fs::read_to_string(file) {
         Ok(text) => Ok(Some(text)),
         Err(e)
@@ -80,7 +143,10 @@ pub fn optional_text(file: &Path) -> Result<Option<String>, String> {
         {
             Ok(None)
         }
-        Err(e) => Err(format!("{}: {e}", file.display())),
+        Err(source) => Err(ResourceError::Unreadable {
+            file: file.into(),
+            source,
+        }),
     }
 }
 
@@ -98,49 +164,63 @@ pub fn apply<C: Component>(
     component: &mut C,
     text: &str,
     file: &Path,
-) -> Result<(), String> {
-    for (number, line) in text
-        .lines()
-        .enumerate()
-        .filter(|(_, l)| !l.trim().is_empty())
-    {
-        let fail = |problem: String| format!("{}:{}: {problem}", file.display(), number + 1);
-        let (name, value) = line
-            .split_once(',')
-            .ok_or_else(|| fail(format!("`{line}`, expected `name,value`")))?;
-        let (name, value) = (name.trim(), value.trim());
-        let (_, variable) = model
-            .find(name)
-            .filter(|(_, v)| v.causality == Causality::Parameter)
-            .ok_or_else(|| fail(format!("`{name}` is not a parameter of {}", C::NAME)))?;
-        let number: f64 = value
-            .parse()
-            .ok()
-            .filter(|number: &f64| number.is_finite())
-            .ok_or_else(|| fail(format!("`{value}` is not a number")))?;
-        let (min, max) = (variable.min, variable.max);
-        if min.is_some_and(|min| number < min) || max.is_some_and(|max| number > max) {
-            return Err(fail(format!("`{name}` = {number} is out of its range")));
+) -> Result<(), ResourceError> {
+    let lines = text.lines().enumerate();
+    for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
+        set(model, component, line).map_err(|problem| ResourceError::StartValue {
+            file: file.into(),
+            line: number + 1,
+            problem,
+        })?;
+    }
+    Ok(())
+}
+
+/// Changes a component as one line of its start values says.
+fn set<C: Component>(
+    model: &Model<C>,
+    component: &mut C,
+    line: &str,
+) -> Result<(), StartValueError> {
+    let (name, text) = line
+        .split_once(',')
+        .ok_or_else(|| StartValueError::NoComma(line.into()))?;
+    let (name, text) = (name.trim().to_string(), text.trim());
+    let Some((_, variable)) = model
+        .find(&name)
+        .filter(|(_, v)| v.causality == Causality::Parameter)
+    else {
+        let component = C::NAME;
+        return Err(StartValueError::NotAParameter { name, component });
+    };
+    let value: f64 = text
+        .parse()
+        .ok()
+        .filter(|value: &f64| value.is_finite())
+        .ok_or_else(|| StartValueError::NotANumber(text.into()))?;
+    let (min, max) = (variable.min, variable.max);
+    if min.is_some_and(|min| value < min) || max.is_some_and(|max| value > max) {
+        return Err(StartValueError::OutOfRange { name, value });
+    }
+    match &variable.access {
+        access if access.is_real() => {
+            if let Some(place) = access.real(component) {
+                *place = value;
+            }
         }
-        match &variable.access {
-            access if access.is_real() => {
-                if let Some(place) = access.real(component) {
-                    *place = number;
-                }
-            }
-            Access::Choice(field, choices) => {
-                let mut known = choices.items.iter().map(|item| item.value);
-                let chosen = known.find(|value| f64::from(*value) == number);
-                *field(component) = chosen.ok_or_else(|| {
-                    fail(format!("`{name}` = {number} is none of {}", choices.name))
-                })?;
-            }
-            _ => {
-                return Err(fail(format!(
-                    "`{name}` is neither Float64 nor an enumeration"
-                )));
-            }
+        Access::Choice(field, choices) => {
+            let mut known = choices.items.iter().map(|item| item.value);
+            let Some(chosen) = known.find(|item| f64::from(*item) == value) else {
+                let choices = choices.name;
+                return Err(StartValueError::NotAChoice {
+                    name,
+                    value,
+                    choices,
+                });
+            };
+            *field(component) = chosen;
         }
+        _ => return Err(StartValueError::Type(name)),
     }
     Ok(())
 }
@@ -196,10 +276,8 @@ mod tests {
             ),
         ] {
             let text = format!("stiffness,1\n{line}\n");
-            assert_eq!(
-                apply(model, &mut component, &text, file),
-                Err(expected.to_string())
-            );
+            let refused = apply(model, &mut component, &text, file).unwrap_err();
+            assert_eq!(refused.to_string(), expected);
         }
     }
 
@@ -208,16 +286,16 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("fmu-kit-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let location = Location::Path(folder.to_str().unwrap());
-        assert_eq!(start_values(location), Ok(None));
-        assert_eq!(start_values(Location::Unknown), Ok(None));
+        assert_eq!(start_values(location).unwrap(), None);
+        assert_eq!(start_values(Location::Unknown).unwrap(), None);
         let file = folder.join(START_VALUES);
         fs::write(&file, "mass,3").unwrap();
         let found = start_values(location).unwrap().unwrap();
         assert_eq!(found, (file.clone(), "mass,3".to_string()));
         // A file instead of the folder is none; one that is not text is a fault.
-        assert_eq!(optional_text(&file.join("below")), Ok(None));
+        assert_eq!(optional_text(&file.join("below")).unwrap(), None);
         fs::write(&file, [0xff, 0xfe]).unwrap();
-        let error = start_values(location).unwrap_err();
+        let error = start_values(location).unwrap_err().to_string();
         assert!(error.contains(START_VALUES), "{error}");
         fs::remove_dir_all(&folder).unwrap();
     }

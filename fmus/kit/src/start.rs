@@ -11,13 +11,40 @@ use crate::{
     component::Component,
     description,
     fault::Status,
-    guard::catch,
+    guard::{Panic, catch},
     instance::Instance,
     log::{Log, Sink},
     model::Model,
     phase::Kind,
-    resources::{self, Location},
+    resources::{self, Location, ResourceError},
+    structure::TableError,
 };
+
+/// Why an instance cannot be made.
+#[derive(Debug, thiserror::Error)]
+enum StartError {
+    /// The component's table is wrong.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// The importer gave no name.
+    #[error("an instance needs a name")]
+    NoName,
+    /// The start values cannot be used.
+    #[error(transparent)]
+    Resources(#[from] ResourceError),
+    /// The token is that of another FMU.
+    #[error("token `{given}`, but the library with its resources has {expected}")]
+    Token { given: String, expected: String },
+    /// The component is not continuous.
+    #[error("offers co-simulation only, no model exchange")]
+    NoModelExchange,
+    /// The component refuses its resources.
+    #[error("{0}")]
+    Load(Box<dyn std::error::Error>),
+    /// The component panicked.
+    #[error(transparent)]
+    Panic(#[from] Panic),
+}
 
 /// An instance on the heap, or NULL with the reason in the log.
 ///
@@ -38,9 +65,9 @@ pub(crate) unsafe fn make<C: Component>(
         let log = Log::new(sink, name.unwrap_or_default(), debug);
         prepare::<C>(name, kind, token, location, log)
     });
-    match made {
-        Ok(Ok(instance)) => Box::into_raw(Box::new(instance)).cast(),
-        Ok(Err(problem)) | Err(problem) => {
+    match made.map_err(StartError::from).flatten() {
+        Ok(instance) => Box::into_raw(Box::new(instance)).cast(),
+        Err(problem) => {
             let log = Log::new(sink, name.unwrap_or_default(), debug);
             log.fault(Status::Error, &format!("{} {function}: {problem}", C::NAME));
             ptr::null_mut()
@@ -54,10 +81,10 @@ fn prepare<C: Component>(
     token: Option<&CStr>,
     location: Location<'_>,
     log: Log,
-) -> Result<Instance<C>, String> {
-    let model = Model::<C>::get().map_err(|e| e.to_string())?;
+) -> Result<Instance<C>, StartError> {
+    let model = Model::<C>::get()?;
     if name.is_none_or(CStr::is_empty) {
-        return Err("an instance needs a name".into());
+        return Err(StartError::NoName);
     }
     let start_values = resources::start_values(location)?;
     let expected = match &start_values {
@@ -66,16 +93,15 @@ fn prepare<C: Component>(
     };
     let token = token.map(CStr::to_string_lossy).unwrap_or_default();
     if token != expected {
-        return Err(format!(
-            "token `{token}`, but the library with its resources has {expected}"
-        ));
+        let given = token.into_owned();
+        return Err(StartError::Token { given, expected });
     }
     if kind == Kind::ModelExchange && !model.offers_model_exchange() {
-        return Err("offers co-simulation only, no model exchange".into());
+        return Err(StartError::NoModelExchange);
     }
     let mut start = C::default();
     if let Some(folder) = location.folder() {
-        start.load(&folder).map_err(|problem| problem.to_string())?;
+        start.load(&folder).map_err(StartError::Load)?;
     }
     if let Some((file, text)) = start_values {
         resources::apply(model, &mut start, &text, &file)?;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use thiserror::Error;
-use units::Unit;
+use units::{Unit, UnitError};
 
 use crate::terminal::Terminal;
 use crate::variable::{Causality, Declaration, Dependency, Row, Type, Value, Variability};
@@ -15,6 +15,50 @@ pub struct TableError {
     component: &'static str,
     variable: String,
     problem: String,
+}
+
+/// What is wrong with one row of a table.
+#[derive(Debug, PartialEq, Error)]
+enum RowError {
+    #[error("has a display unit but no unit")]
+    NoUnit,
+    #[error("only a Float64 has a unit")]
+    UnitOfAnotherType,
+    #[error(transparent)]
+    Unit(#[from] NotationError),
+    #[error("cannot be shown in `{shown}`: {source}")]
+    NotShown { shown: String, source: UnitError },
+    #[error("cannot be {0:?} and {1:?}")]
+    Variability(Causality, Variability),
+    #[error("only a Float64 is continuous")]
+    Continuous,
+    #[error("is not an element of its array")]
+    NoElement,
+    #[error("start {0} is not a choice")]
+    NotAChoice(i32),
+    #[error("start {start} is outside {min} to {max}")]
+    OutOfRange { start: f64, min: f64, max: f64 },
+}
+
+/// A unit that is not in the notation of Modelica.
+#[derive(Debug, PartialEq, Error)]
+#[error("unit `{unit}`: {problem}")]
+struct NotationError {
+    unit: String,
+    problem: Notation,
+}
+
+/// Why a unit is not in the notation of Modelica.
+#[derive(Debug, PartialEq, Error)]
+enum Notation {
+    #[error("`{0}` is not of Modelica's notation")]
+    Character(char),
+    #[error("a product below the line is in parentheses")]
+    Parentheses,
+    #[error(transparent)]
+    Unknown(#[from] UnitError),
+    #[error("has no whole exponents of base units")]
+    Exponents,
 }
 
 /// A continuous state and its derivative, as positions in the table from 0.
@@ -60,8 +104,9 @@ impl Structure {
             if names[variable.name.as_str()] != index {
                 return Err(wrong("the name is used twice".into()));
             }
-            check_units(row).map_err(wrong)?;
-            check_kind(row).map_err(wrong)?;
+            let refused = |error: RowError| wrong(error.to_string());
+            check_units(row).map_err(refused)?;
+            check_kind(row).map_err(refused)?;
             let find = |name: &str| {
                 names
                     .get(name)
@@ -163,21 +208,24 @@ pub(crate) fn check_terminals(
     Ok(())
 }
 
-fn check_units(row: &Row) -> Result<(), String> {
+fn check_units(row: &Row) -> Result<(), RowError> {
     let Declaration {
         unit, display_unit, ..
     } = row.declaration;
     let unit = match (unit, display_unit) {
         (None, None) => return Ok(()),
-        (None, Some(_)) => return Err("has a display unit but no unit".into()),
+        (None, Some(_)) => return Err(RowError::NoUnit),
         (Some(unit), _) => modelica_unit(unit)?,
     };
     if row.kind != Type::Real {
-        return Err("only a Float64 has a unit".into());
+        return Err(RowError::UnitOfAnotherType);
     }
     if let Some(shown) = display_unit {
         let fits = unit.factor_to(&modelica_unit(shown)?);
-        fits.map_err(|error| format!("cannot be shown in `{shown}`: {error}"))?;
+        fits.map_err(|source| RowError::NotShown {
+            shown: shown.to_string(),
+            source,
+        })?;
     }
     Ok(())
 }
@@ -185,41 +233,44 @@ fn check_units(row: &Row) -> Result<(), String> {
 /// Reads a unit in the notation of Modelica, which importers read too: names with whole exponents,
 /// joined by `.`, divided at most once by a name or by a product in parentheses, as in
 /// `lbf/(V.s2)`.
-fn modelica_unit(text: &str) -> Result<Unit, String> {
-    let wrong = |problem: String| format!("unit `{text}`: {problem}");
+fn modelica_unit(text: &str) -> Result<Unit, NotationError> {
+    let wrong = |problem: Notation| NotationError {
+        unit: text.to_string(),
+        problem,
+    };
     let foreign = |c: &char| !(c.is_ascii_alphanumeric() || "./()-".contains(*c));
     if let Some(foreign) = text.chars().find(foreign) {
-        return Err(wrong(format!("`{foreign}` is not of Modelica's notation")));
+        return Err(wrong(Notation::Character(foreign)));
     }
     let below = text.split_once('/').map_or("", |(_, below)| below);
     if below.contains('/') || (below.contains('.') && !below.starts_with('(')) {
-        return Err(wrong("a product below the line is in parentheses".into()));
+        return Err(wrong(Notation::Parentheses));
     }
-    let unit = Unit::parse(text).map_err(|error| wrong(error.to_string()))?;
+    let unit = Unit::parse(text).map_err(|error| wrong(error.into()))?;
     match unit.base_unit() {
         Some(_) if !text.is_empty() => Ok(unit),
-        _ => Err(wrong("has no whole exponents of base units".into())),
+        _ => Err(wrong(Notation::Exponents)),
     }
 }
 
-fn check_kind(row: &Row) -> Result<(), String> {
+fn check_kind(row: &Row) -> Result<(), RowError> {
     use Causality::{Input, Local, Output, Parameter};
     use Variability::{Continuous, Discrete, Fixed, Tunable};
     let variable = row.declaration;
     match (variable.causality, variable.variability) {
         (Parameter, Fixed | Tunable) | (Input | Output | Local, Discrete | Continuous) => {}
         (causality, variability) => {
-            return Err(format!("cannot be {causality:?} and {variability:?}"));
+            return Err(RowError::Variability(causality, variability));
         }
     }
     if variable.variability == Continuous && row.kind != Type::Real {
-        return Err("only a Float64 is continuous".into());
+        return Err(RowError::Continuous);
     }
     let value = match (row.kind, &row.start) {
-        (_, Value::Missing) => return Err("is not an element of its array".into()),
+        (_, Value::Missing) => return Err(RowError::NoElement),
         (Type::Choice(choices), Value::Integer(value)) => {
             if !choices.items.iter().any(|item| item.value == *value) {
-                return Err(format!("start {value} is not a choice"));
+                return Err(RowError::NotAChoice(*value));
             }
             return Ok(());
         }
@@ -230,7 +281,11 @@ fn check_kind(row: &Row) -> Result<(), String> {
     let min = variable.min.unwrap_or(f64::NEG_INFINITY);
     let max = variable.max.unwrap_or(f64::INFINITY);
     if !value.is_finite() || value < min || value > max {
-        return Err(format!("start {value} is outside {min} to {max}"));
+        return Err(RowError::OutOfRange {
+            start: value,
+            min,
+            max,
+        });
     }
     Ok(())
 }

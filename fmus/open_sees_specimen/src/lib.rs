@@ -95,9 +95,20 @@ impl Default for OpenSeesSpecimen {
     }
 }
 
+/// A parameter that OpenSees cannot be started with.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum SettingsError {
+    /// A negative direction.
+    #[error("direction = {0}, expected 1 to 6, or 0 for the model's own")]
+    Direction(i32),
+    /// A limit that is not a positive time, s.
+    #[error("time_limit = {0} s, expected above 0")]
+    TimeLimit(f64),
+}
+
 impl OpenSeesSpecimen {
     /// What is to run; none where nothing stands on the table.
-    fn settings(&self) -> Result<Option<Settings>, String> {
+    fn settings(&self) -> Result<Option<Settings>, SettingsError> {
         let model = match self.model.is_empty() {
             true => &self.carried,
             false => &self.model,
@@ -116,14 +127,14 @@ impl OpenSeesSpecimen {
             },
             direction: match self.direction {
                 0 => None,
-                direction => Some(u32::try_from(direction).map_err(|_| {
-                    format!("direction = {direction}, expected 1 to 6, or 0 for the model's own")
-                })?),
+                direction => {
+                    let known = u32::try_from(direction);
+                    Some(known.map_err(|_| SettingsError::Direction(direction))?)
+                }
             },
             units: given(&self.units),
             python: given(&self.python),
-            limit: limit
-                .ok_or_else(|| format!("time_limit = {} s, expected above 0", self.time_limit))?,
+            limit: limit.ok_or(SettingsError::TimeLimit(self.time_limit))?,
         }))
     }
 }

@@ -7,6 +7,28 @@ use serde::{Deserialize, Serialize};
 /// Sample time where there is no motion, s.
 const USUAL: f64 = 0.002;
 
+/// A text that is not a motion.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// A line without four finite numbers.
+    #[error("line {number}: `{line}`, expected four numbers")]
+    Line {
+        /// The line, from 1.
+        number: usize,
+        /// Its text.
+        line: String,
+    },
+    /// No samples.
+    #[error("there is no sample")]
+    Empty,
+    /// One sample only.
+    #[error("one sample has no sample time")]
+    Single,
+    /// Times with unequal steps.
+    #[error("the times are not evenly spaced")]
+    Uneven,
+}
+
 /// A motion, evenly sampled, SI; or none.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Motion {
@@ -29,12 +51,11 @@ impl Motion {
     ///
     /// # Errors
     /// The line that cannot be read; fewer than two samples; times that are not even.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub fn parse(text: &str) -> Result<Self, MotionError> {
         let mut samples = Vec::new();
         let mut times = Vec::new();
         let lines = text.lines().enumerate().skip(1);
         for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-            let fault = || format!("line {}: `{line}`, expected four numbers", number + 1);
             let cells: Option<Vec<f64>> = line
                 .split(',')
                 .map(|cell| cell.trim().parse().ok())
@@ -44,14 +65,19 @@ impl Motion {
                     times.push(time);
                     samples.push([x, v, a]);
                 }
-                _ => return Err(fault()),
+                _ => {
+                    return Err(MotionError::Line {
+                        number: number + 1,
+                        line: line.to_string(),
+                    });
+                }
             }
         }
         let (Some(first), Some(last)) = (times.first(), times.last()) else {
-            return Err("there is no sample".to_string());
+            return Err(MotionError::Empty);
         };
         if times.len() < 2 {
-            return Err("one sample has no sample time".to_string());
+            return Err(MotionError::Single);
         }
         let mean = (last - first) / (times.len() - 1) as f64;
         // As it was written, where the mean only rounds it.
@@ -62,7 +88,7 @@ impl Motion {
         let even =
             |(k, time): (usize, &f64)| (time - first - k as f64 * mean).abs() <= 1e-6 * mean.abs();
         if mean <= 0.0 || !times.iter().enumerate().all(even) {
-            return Err("the times are not evenly spaced".to_string());
+            return Err(MotionError::Uneven);
         }
         Ok(Self {
             sample_time,
@@ -135,7 +161,9 @@ mod tests {
             ("0,0,0,0\n0.1,0,0,0\n0.3,0,0,0\n", "evenly"),
             ("0,0,0,0\n0,0,0,0\n", "evenly"),
         ] {
-            let problem = Motion::parse(&format!("{head}{rows}")).unwrap_err();
+            let problem = Motion::parse(&format!("{head}{rows}"))
+                .unwrap_err()
+                .to_string();
             assert!(problem.contains(words), "{problem}");
         }
     }

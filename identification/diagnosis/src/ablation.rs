@@ -193,3 +193,147 @@ pub(super) fn unseen_gain<M: ExtensibleModel>(
     let scatter: f64 = gains.iter().map(|gain| (gain - mean).powi(2)).sum();
     (count > 1.0 && scatter > 0.0).then(|| sum / (scatter * count / (count - 1.0)).sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Candidate, Lesson};
+
+    /// Two channels that are noise about a level; the effect doubles the noise that is assumed.
+    struct Levels {
+        candidates: Vec<Candidate>,
+        measured: Vec<Vec<[f64; 2]>>,
+    }
+
+    impl ExtensibleModel for Levels {
+        /// The assumed noise.
+        type Predictor = f64;
+
+        fn nuisance(&self) -> usize {
+            1
+        }
+        fn candidates(&self) -> &[Candidate] {
+            &self.candidates
+        }
+        fn records(&self) -> usize {
+            self.measured.len()
+        }
+        fn record_name(&self, _: usize) -> &str {
+            "record"
+        }
+        fn channels(&self) -> &[&'static str] {
+            &["one", "other"]
+        }
+        fn regressors(&self, _: usize) -> Vec<(String, Vec<f64>)> {
+            Vec::new()
+        }
+        fn with_learned_noise(&self, _: &Point, _: &[f64], _: &[usize]) -> Option<Lesson<Self>> {
+            None
+        }
+        fn quiet_records(&self, _: &[usize]) -> Vec<usize> {
+            Vec::new()
+        }
+        fn residual_count(&self, record: usize) -> usize {
+            2 * self.measured[record].len()
+        }
+        fn sample_count(&self, record: usize) -> usize {
+            self.measured[record].len()
+        }
+        fn predictor(&self, point: &Point) -> Option<f64> {
+            Some(if point.effects.is_empty() { 1.0 } else { 2.0 })
+        }
+        fn log_determinant(&self, noise: &f64) -> f64 {
+            2.0 * (noise * noise).ln()
+        }
+        fn residuals(&self, noise: &f64, point: &Point, record: usize, out: &mut [f64]) -> bool {
+            let values = self.measured[record].as_flattened();
+            for (out, value) in out.iter_mut().zip(values) {
+                *out = (value - point.nuisance[0]) / noise;
+            }
+            true
+        }
+    }
+
+    fn levels(lengths: &[usize], size: f64) -> Levels {
+        let value = |k: usize| size * ((k * k) as f64).sin();
+        Levels {
+            candidates: vec![Candidate::new("louder", Vec::new(), Vec::new())],
+            measured: lengths
+                .iter()
+                .map(|&length| {
+                    (0..length)
+                        .map(|k| [value(k), 1.0 + value(k + 7)])
+                        .collect()
+                })
+                .collect(),
+        }
+    }
+
+    /// By the densities of the normal distribution, sample by sample.
+    #[test]
+    fn an_unseen_gain_is_a_sum_of_log_likelihoods_over_the_scatter_of_its_blocks() {
+        let bare = Point {
+            nuisance: vec![0.25],
+            effects: Vec::new(),
+        };
+        let louder = Point {
+            nuisance: vec![0.5],
+            effects: vec![(0, Vec::new())],
+        };
+        let model = levels(&[203, 100, 57], 3.0);
+        let found = unseen_gain(&model, &louder, &bare, &[0, 2]).unwrap();
+        let density = |value: f64, level: f64, noise: f64| {
+            let off = (value - level) / noise;
+            -2.0 * noise.ln() - off * off
+        };
+        // A fortieth of a record, rounded up: 6 samples of 203, 2 of 57.
+        let mut blocks = Vec::new();
+        for (record, length) in [(0, 6), (2, 2)] {
+            for block in model.measured[record].chunks(length) {
+                let gain = |value: &f64| density(*value, 0.5, 2.0) - density(*value, 0.25, 1.0);
+                blocks.push(block.as_flattened().iter().map(gain).sum::<f64>());
+            }
+        }
+        assert_eq!(blocks.len(), 34 + 29);
+        let count = blocks.len() as f64;
+        let mean = blocks.iter().sum::<f64>() / count;
+        let variance = blocks.iter().map(|own| (own - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let expected = mean / (variance / count).sqrt();
+        assert!(
+            (found - expected).abs() < 1e-9 * expected.abs(),
+            "{found} {expected}"
+        );
+        assert!(found > 0.0);
+        // The other way round it is as much worse.
+        let back = unseen_gain(&model, &bare, &louder, &[0, 2]).unwrap();
+        assert!((back + found).abs() < 1e-9);
+        // One block has no scatter, and neither have equal ones.
+        assert_eq!(unseen_gain(&levels(&[1], 3.0), &louder, &bare, &[0]), None);
+        assert_eq!(unseen_gain(&levels(&[80], 0.0), &bare, &bare, &[0]), None);
+        assert_eq!(unseen_gain(&model, &louder, &bare, &[]), None);
+    }
+
+    #[test]
+    fn a_small_gain_beside_a_large_one_of_its_law_is_form() {
+        let gains = [
+            ("slip", 0.5),
+            ("slip", 100.0),
+            ("lag", 0.5),
+            ("", 0.1),
+            ("", 90.0),
+        ];
+        let form: Vec<bool> = (0..gains.len())
+            .map(|place| is_form(&gains, place))
+            .collect();
+        assert_eq!(form, [true, false, false, false, false]);
+        // One per cent is not less than one per cent.
+        assert!(!is_form(&[("slip", 1.0), ("slip", 100.0)], 0));
+        let point = Point {
+            nuisance: vec![1.0],
+            effects: vec![(3, vec![0.5]), (7, vec![2.0])],
+        };
+        let smaller = without(&point, 0);
+        assert_eq!(smaller.effects, [(7, vec![2.0])]);
+        assert_eq!(smaller.nuisance, point.nuisance);
+    }
+}

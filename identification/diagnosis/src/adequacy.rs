@@ -466,6 +466,40 @@ mod tests {
 
     /// Chi-square quantiles of printed tables at the normal deviates 1.6449 (95 %) and 2.3263 (99 %).
     #[test]
+    fn bursts_are_few_and_not_where_the_motion_is() {
+        let own: Vec<f64> = (0..20).map(f64::from).collect();
+        let quiet = [100.0; 20];
+        let calm = [-1.0; 20];
+        let is_burst = |loud: &[usize], all: &[f64], is_explained| {
+            let motion = Motion {
+                own: &own,
+                all,
+                is_explained,
+            };
+            motion.are_bursts(loud)
+        };
+        // Anywhere, as long as they do not follow the motion.
+        assert!(is_burst(&[3], &calm, false) && is_burst(&[1, 10, 18], &calm, false));
+        assert!(!is_burst(&[15, 16, 17, 18, 19], &calm, false));
+        assert!(!is_burst(&[], &quiet, true));
+        // Eight at most.
+        assert!(is_burst(&[0, 1, 2, 3, 4, 5, 6, 7], &calm, false));
+        assert!(!is_burst(&[0, 1, 2, 3, 4, 5, 6, 7, 8], &calm, false));
+        // One or two where it moves most, if other records move more or effects explain the rest.
+        assert!(!is_burst(&[19], &calm, false));
+        assert!(is_burst(&[19], &quiet, false) && is_burst(&[19], &calm, true));
+        assert!(is_burst(&[18, 19], &quiet, false));
+        assert!(!is_burst(&[17, 18, 19], &quiet, true));
+        // Parts that move alike are in the middle of each other.
+        let alike = Motion {
+            own: &[2.0; 4],
+            all: &calm,
+            is_explained: false,
+        };
+        assert!(alike.are_bursts(&[0, 1, 2]));
+    }
+
+    #[test]
     fn the_deviate_of_a_chi_square_is_that_of_the_tables() {
         for (count, at_95, at_99) in [
             (5.0, 11.070, 15.086),

@@ -636,6 +636,66 @@ mod tests {
         assert!(errors[0] < 0.5 && off.abs() < 3.5, "{off} {errors:?}");
     }
 
+    /// Against the cost itself: it is twice the negative log likelihood where the variance is that of the errors.
+    #[test]
+    fn the_normal_equations_are_the_slope_and_the_curvature_of_the_cost() {
+        let mut model = Decay::new([1.5, 1.2, 0.5, 0.1, -0.1], 0.01);
+        // A detail of the form that the errors do not see: only what is stated holds it.
+        model.candidates[0].parameters.push(EffectParameter {
+            name: "bend",
+            unit: "1",
+            scale: Scale::Linear(0.5),
+            role: Role::Shape {
+                typical: 1.0,
+                spread: 0.2,
+            },
+            bounds: (0.0, 5.0),
+        });
+        let point = Point {
+            nuisance: vec![20.0, 10.0, 3.0, -4.0],
+            effects: vec![(0, vec![2.0, 1.7])],
+        };
+        let at = solution(&model, &point, 0).unwrap();
+        let columns = Columns::at(&model, &at, 0).unwrap().columns;
+        let all: Vec<&Vec<f64>> = columns.iter().collect();
+        let variance = squares(&at.errors) / at.errors.len() as f64;
+        let (hessian, gradient) = normal(&model, &point, &all, &at.errors, variance);
+        let count = 6;
+        assert_eq!((hessian.nrows(), gradient.len()), (count, count));
+        for i in 0..count {
+            let cost = |by: f64| {
+                let mut moved = point.clone();
+                match i {
+                    0..4 => moved.nuisance[i] += by,
+                    _ => moved.effects[0].1[i - 4] += by,
+                }
+                solution(&model, &moved, 0).unwrap().cost
+            };
+            let step = 1e-4;
+            let slope = (cost(step) - cost(-step)) / (2.0 * step);
+            let off = (gradient[i] + 0.5 * slope).abs();
+            assert!(
+                off < 1e-3 * slope.abs().max(1.0),
+                "{i}: {} {slope}",
+                gradient[i]
+            );
+            for j in 0..count {
+                let products = columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b);
+                let mut expected = products.sum::<f64>() / variance;
+                if i == j {
+                    expected += match i {
+                        0 | 1 => model.prior_width().powi(-2),
+                        2 | 3 => WEAK.powi(-2),
+                        4 => 0.0,
+                        _ => 25.0,
+                    };
+                }
+                let off = (hessian[(i, j)] - expected).abs();
+                assert!(off <= 1e-9 * expected.abs().max(1.0), "{i} {j}");
+            }
+        }
+    }
+
     #[test]
     fn derivatives_are_learned_along_a_step_and_stay_across_it() {
         let model = Decay::new([1.5, 1.2, 0.0, 0.0, 0.0], 0.01);

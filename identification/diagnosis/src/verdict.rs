@@ -665,6 +665,72 @@ mod tests {
     }
 
     #[test]
+    fn estimates_are_in_si_with_the_errors_behind_those_of_the_nuisance() {
+        use crate::model::EffectParameter;
+        let parameter = |name, scale, role| EffectParameter {
+            name,
+            unit: "N",
+            scale,
+            role,
+            bounds: (0.0, 10.0),
+        };
+        let size = parameter("size", Scale::Linear(0.5), Role::Size { weak: 0.1 });
+        let shape = Role::Shape {
+            typical: 1.0,
+            spread: 0.5,
+        };
+        let shape = parameter("shape", Scale::Linear(-2.0), shape);
+        let candidates = [
+            Candidate::new("first", vec![size.clone()], Vec::new()),
+            Candidate::new("second", vec![size, shape], Vec::new()),
+        ];
+        let point = Point {
+            nuisance: vec![0.1, 0.2],
+            effects: vec![(1, vec![3.0, 4.0]), (0, vec![5.0])],
+        };
+        let found = estimates(&candidates, &point, &[9.0, 9.0, 0.25, 0.125]);
+        let figures: Vec<(&str, &str, f64, f64, bool)> = found
+            .iter()
+            .flat_map(|own| own.parameters.iter().map(move |one| (own.effect, one)))
+            .map(|(effect, one)| {
+                let name = one.name.as_str();
+                (effect, name, one.value, one.standard_error, one.is_shape)
+            })
+            .collect();
+        assert_eq!(
+            figures[..2],
+            [
+                ("second", "size", 1.5, 0.125, false),
+                ("second", "shape", -8.0, 0.25, true),
+            ]
+        );
+        // Nobody knows the error of the last.
+        let (effect, _, value, error, _) = figures[2];
+        assert_eq!((effect, value), ("first", 2.5));
+        assert!(error.is_nan());
+    }
+
+    #[test]
+    fn verdicts_are_words_that_fill_a_column() {
+        let words = [
+            Verdict::Adequate,
+            Verdict::Named,
+            Verdict::Ambiguous,
+            Verdict::TooSmall,
+            Verdict::Unexplained,
+        ]
+        .map(|own| format!("{own:>11}|"));
+        let expected = [
+            "   adequate|",
+            "      named|",
+            "  ambiguous|",
+            "  too small|",
+            "unexplained|",
+        ];
+        assert_eq!(words, expected);
+    }
+
+    #[test]
     fn an_effect_that_predicts_unseen_records_worse_is_refuted() {
         assert_eq!(
             refuted(&[Some(13.6), Some(-6.7), None, Some(-3.1)]),

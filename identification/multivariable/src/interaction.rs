@@ -46,6 +46,19 @@ pub struct Interaction {
     pub decoupled: Option<Loop>,
 }
 
+/// A static gain that cannot be inverted: some motion is out of reach of every command.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "the static gain cannot be inverted (singular values {largest:.3e} and {least:.3e}): the commands move the strokes \
+     alike; check whether two sensors or two commands are the same"
+)]
+pub struct SingularGain {
+    /// Largest singular value.
+    pub largest: f64,
+    /// Smallest singular value.
+    pub least: f64,
+}
+
 /// Frequencies at which margins are sought.
 const FREQUENCIES: usize = 600;
 /// Relative gain from which a stroke belongs to a command.
@@ -57,18 +70,13 @@ const KEPT: f64 = 0.5;
 ///
 /// # Errors
 /// A static gain that cannot be inverted: some motion is out of reach of every command.
-pub fn interaction(model: &Model) -> Result<Interaction, String> {
+pub fn interaction(model: &Model) -> Result<Interaction, SingularGain> {
     let n = model.actuators();
     let gain = DMatrix::from_fn(n, n, |i, j| model.static_gain[i][j]);
     let singular = gain.clone().svd(false, false).singular_values;
     let (least, largest) = (singular.min(), singular.max());
     if least.is_nan() || largest.is_nan() || least <= 1e-3 * largest {
-        return Err(format!(
-            "the static gain cannot be inverted (singular values {:.3e} and {:.3e}): the commands move the strokes alike; \
-             check whether two sensors or two commands are the same",
-            singular.max(),
-            singular.min()
-        ));
+        return Err(SingularGain { largest, least });
     }
     let inverse = gain
         .clone()

@@ -86,14 +86,16 @@ impl Model {
                 format!("{error}; expected a model that `shakebench identify` wrote from two commands and strokes"),
             )
         })?;
-        model.check().map_err(|what| Error::at(place, what))?;
+        model.check(&place)?;
         Ok(model)
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// Checks the numbers of the model in the file `place`.
+    fn check(&self, place: &str) -> Result<(), Error> {
+        let wrong = |what: &str| Err(Error::at(place, what));
         let n = self.residues.len();
         if self.kind != KIND {
-            return Err(format!("`kind` is `{}`; expected `{KIND}`", self.kind));
+            return wrong(&format!("`kind` is `{}`; expected `{KIND}`", self.kind));
         }
         let shapes = n >= 2
             && [
@@ -108,8 +110,8 @@ impl Model {
                         .all(|entry| entry.len() == self.poles_rad_s.len())
             });
         if !shapes {
-            return Err(
-                "`delay_s`, `residues` and `residual_m` do not have one row per actuator".into(),
+            return wrong(
+                "`delay_s`, `residues` and `residual_m` do not have one row per actuator",
             );
         }
         if let Some([re, _]) = self
@@ -117,14 +119,14 @@ impl Model {
             .iter()
             .find(|[re, im]| re.is_nan() || *re >= 0.0 || !im.is_finite())
         {
-            return Err(format!(
+            return wrong(&format!(
                 "`poles_rad_s`: a real part of {re} is not stable; expected negative ones"
             ));
         }
         if self.period_s > 0.0 && self.delay_s.iter().all(|delay| *delay >= 0.0) {
             return Ok(());
         }
-        Err("`period_s` and `delay_s` must be positive".into())
+        wrong("`period_s` and `delay_s` must be positive")
     }
 }
 

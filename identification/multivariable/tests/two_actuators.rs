@@ -374,6 +374,7 @@ fn what_cannot_be_used_is_refused_with_its_place() {
     assert!(
         interaction(&singular)
             .unwrap_err()
+            .to_string()
             .contains("cannot be inverted")
     );
 }

@@ -380,15 +380,4 @@ fn out_of_order(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::steps;
-
-    #[test]
-    fn a_run_has_the_steps_that_are_named_or_a_few_usual_ones() {
-        assert_eq!(steps(Some(0.5), Some(3.0)), (0.5, 3.0));
-        // Twenty steps, a hundredth of the end, twenty of a millisecond.
-        assert_eq!(steps(Some(0.5), None), (0.5, 10.0));
-        assert_eq!(steps(None, Some(3.0)), (0.03, 3.0));
-        assert_eq!(steps(None, None), (1e-3, 0.02));
-    }
-}
+mod tests;

@@ -103,7 +103,7 @@ pub(super) fn check(findings: &mut Findings, fmu: &Arc<Fmu>, options: &Options) 
 
 /// Central differences of all unknowns by one known, which gets its value back, each with its uncertainty by rounding;
 /// none for an unknown that is not smooth there. None at all where the library refuses.
-fn differences(
+pub(super) fn differences(
     instance: &mut Instance,
     unknowns: &[u32],
     known: u32,

@@ -383,6 +383,16 @@ fn references_and_numbers_of_fmi_3_are_checked() {
                 &["error", "`u`", "2 start values for 3"],
             ),
             (
+                "<Start value=\"x\"/>",
+                "<Start value=\"x\"/><Start value=\"y\"/>",
+                &["error", "`s`", "2 start values for 1 elements"],
+            ),
+            (
+                "<Start value=\"x\"/>",
+                "<Start value=\"x\"/><Start value=\"y\"/><Dimension start=\"3\"/>",
+                &["error", "`s`", "2 start values for 3 elements"],
+            ),
+            (
                 "name=\"y\" valueReference=\"4\"",
                 "name=\"y\" valueReference=\"4\" clocks=\"1\"",
                 &["error", "`y`", "clock `1`"],
@@ -482,4 +492,61 @@ fn very_many_findings_are_counted_and_found_in_time() {
     rules::check(&mut findings, &text);
     assert_eq!(findings.findings.len(), 1000);
     assert!(findings.count(Severity::Error) > 400_000);
+}
+
+#[test]
+fn a_file_is_checked_by_its_name_and_its_findings_are_sorted() {
+    use std::io::Write as _;
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let archive = |name: &str, description: &str| {
+        let mut archive = zip::ZipWriter::new(std::fs::File::create(place(name)).unwrap());
+        let options = zip::write::SimpleFileOptions::default();
+        archive.start_file(DESCRIPTION, options).unwrap();
+        archive.write_all(description.as_bytes()).unwrap();
+        archive.finish().unwrap();
+        validate(&place(name), None).unwrap()
+    };
+    // Upper case is an FMU too. There is nothing in it but its description.
+    let sound = archive("Sound.FMU", SECOND);
+    assert_eq!((sound.kind, sound.version.as_deref()), ("fmu", Some("2.0")));
+    let told = |found: &Findings| -> Vec<String> {
+        let folder = format!("{}/", folder.path().display());
+        let all = found.findings.iter();
+        all.map(|own| format!("{} {}: {}", own.severity, own.place, own.message))
+            .map(|line| line.replace(&folder, ""))
+            .collect()
+    };
+    let lacks = [
+        "error archive: there are neither binaries nor sources",
+        "error library: Sound.FMU: `validated` could not be instantiated: it needs a process of its own, and \
+         no program is named that can be one (`Options::guest`)",
+        "note archive: there is no documentation",
+        "note archive: documentation/licenses contains no licence",
+        "note archive: there is no reference result for comparison",
+    ];
+    assert_eq!(told(&sound), lacks);
+    let is_rest = |finding: &Finding| finding.message.contains("are not listed");
+
+    // What is too much to list is counted, and the worst comes first.
+    let mut text = SECOND.split("<ScalarVariable").next().unwrap().to_string();
+    for _ in 0..Findings::MOST + 10 {
+        text += "\n<ScalarVariable name=\"v\" valueReference=\"1\" causality=\"parameter\"><Real start=\"0\"/>\
+                 </ScalarVariable>";
+    }
+    text += "\n</ModelVariables><ModelStructure/></fmiModelDescription>";
+    let many = archive("many.fmu", &text);
+    let rest: Vec<&Finding> = many.findings.iter().filter(|own| is_rest(own)).collect();
+    assert_eq!(rest.len(), 1, "{rest:#?}");
+    assert_eq!(rest[0].severity, Severity::Error);
+    assert!(rest[0].place.ends_with("many.fmu"), "{rest:#?}");
+    let severities: Vec<Severity> = many.findings.iter().map(|own| own.severity).collect();
+    assert!(severities.is_sorted());
+
+    std::fs::write(place("notes.txt"), "").unwrap();
+    let told = validate(&place("notes.txt"), None).unwrap_err();
+    let told = told.to_string();
+    assert!(told.ends_with("notes.txt: expected an .fmu or an .ssp file"));
+    let told = validate(&place("none.fmu"), None).unwrap_err().to_string();
+    assert!(told.contains("none.fmu: No such file"), "{told}");
 }

@@ -377,6 +377,47 @@ mod tests {
         assert_eq!(check_attributes(&many), Err(line));
     }
 
+    /// Headers of the formats: ELF (its class and machine), PE, Mach-O and its fat form.
+    #[test]
+    fn a_library_of_another_system_or_processor_is_named() {
+        let elf = |class: u8, machine: u8| {
+            let mut head = [0; 20];
+            head[..4].copy_from_slice(b"\x7fELF");
+            (head[4], head[18]) = (class, machine);
+            head
+        };
+        let begin = |bytes: &[u8]| {
+            let mut head = [0; 20];
+            head[..bytes.len()].copy_from_slice(bytes);
+            head
+        };
+        let (system, processor) = (std::env::consts::OS, std::env::consts::ARCH);
+        for (head, own, words) in [
+            (elf(2, 0x3e), ("linux", "x86_64"), "a Linux x86-64 library"),
+            (elf(2, 0xb7), ("linux", "aarch64"), "a Linux ARM64 library"),
+            (
+                elf(1, 0x03),
+                ("linux", "x86"),
+                "a Linux library for another processor",
+            ),
+            (begin(b"MZ"), ("windows", processor), "a Windows library"),
+            (
+                begin(&[0xcf, 0xfa, 0xed, 0xfe]),
+                ("macos", processor),
+                "a macOS library",
+            ),
+            (
+                begin(&[0xca, 0xfe, 0xba, 0xbe]),
+                ("macos", processor),
+                "a macOS library",
+            ),
+            (begin(b"#!/bin/sh"), ("", ""), "no shared library at all"),
+        ] {
+            let expected = (own != (system, processor)).then_some(words);
+            assert_eq!(foreign(&head), expected, "{words}");
+        }
+    }
+
     #[test]
     fn entries_that_share_bytes_are_refused() {
         use std::io::Write;

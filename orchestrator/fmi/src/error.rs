@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::archive::file_name;
 use super::call::Lost;
+use super::stand_in::BehaviourError;
 
 /// An FMU that cannot be used.
 #[derive(Debug, Error)]
@@ -152,11 +153,8 @@ pub(super) enum InstanceError {
     )]
     Scheduled,
     /// What computes the instance cannot begin, in its own words.
-    #[error("{reason}")]
-    StandIn {
-        /// Why.
-        reason: String,
-    },
+    #[error("{0}")]
+    StandIn(BehaviourError),
     /// It needs a process of its own.
     #[error(
         "it needs a process of its own, and no program is named that can be one (`Options::guest`)"

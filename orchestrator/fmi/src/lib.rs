@@ -35,7 +35,7 @@ pub use messages::Message;
 pub use native::printing::Diverted;
 pub use options::{Isolation, Options};
 pub use processes::Processes;
-pub use stand_in::{Begin, Behaviour};
+pub use stand_in::{Begin, Behaviour, BehaviourError};
 pub use trace::Trace;
 
 /// What helps where a component of this project is not whole, or of another machine.

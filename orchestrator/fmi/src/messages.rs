@@ -108,3 +108,80 @@ pub(super) fn printable(text: &str) -> String {
 fn is_directional(character: char) -> bool {
     matches!(character, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn characters_that_steer_a_terminal_are_shown() {
+        for (text, expected) in [
+            ("plain \u{e9}", "plain \u{e9}"),
+            ("two\n\tlines", "two\n\tlines"),
+            ("\u{1b}[31mred\u{7}", "\\u{1b}[31mred\\u{7}"),
+            ("back\rward", "back\\rward"),
+            ("\u{202e}txt.exe", "\\u{202e}txt.exe"),
+            ("\u{200f}\u{2067}", "\\u{200f}\\u{2067}"),
+        ] {
+            assert_eq!(printable(text), expected);
+        }
+        let most = Messages::LONGEST;
+        assert_eq!(printable(&"x".repeat(most)), "x".repeat(most));
+        let cut = printable(&"x".repeat(3 * most));
+        assert_eq!(cut, "x".repeat(most + 1) + "...");
+    }
+
+    #[test]
+    fn lines_that_take_turns_are_kept_once_with_their_number() {
+        let messages = Messages::new(false);
+        for _ in 0..3 {
+            messages.message(1, "own", "  one  ");
+            messages.message(3, "own", "other");
+        }
+        messages.message(3, "own", "one");
+        messages.message(-1, "\u{7}", "strange");
+        let kept: Vec<(&str, String, String, usize)> = messages
+            .take()
+            .into_iter()
+            .map(|own| (own.status, own.category, own.text, own.times))
+            .collect();
+        let line = |status, category: &str, text: &str, times| {
+            (status, category.to_string(), text.to_string(), times)
+        };
+        assert_eq!(
+            kept,
+            [
+                line("warning", "own", "one", 3),
+                line("error", "own", "other", 3),
+                line("error", "own", "one", 1),
+                line("unknown", "\\u{7}", "strange", 1),
+            ]
+        );
+        assert_eq!(messages.take(), []);
+    }
+
+    #[test]
+    fn a_line_from_long_ago_is_kept_again_and_there_is_a_most() {
+        let messages = Messages::new(false);
+        let log = |number: usize| messages.message(0, "", &number.to_string());
+        (0..=Messages::RECENT).for_each(log);
+        // The first is one too far back, the second is the last that counts.
+        log(0);
+        log(2);
+        let kept = messages.take();
+        assert_eq!(kept.len(), Messages::RECENT + 2);
+        assert_eq!((kept[0].times, kept[2].times), (1, 2));
+        (0..Messages::KEPT + 100).for_each(log);
+        assert_eq!(messages.take().len(), Messages::KEPT);
+    }
+
+    #[test]
+    fn who_wants_warnings_only_gets_what_tells_why_a_call_failed() {
+        let messages = Messages::new(true);
+        messages.message(0, "logAll", "chatter");
+        messages.message(0, "logStatusError", "why");
+        messages.message(1, "logAll", "careful");
+        let kept: Vec<String> = messages.take().into_iter().map(|own| own.text).collect();
+        assert_eq!(kept, ["why", "careful"]);
+    }
+}

@@ -2,6 +2,7 @@
 //! place of a controller. To the master it is an FMU like any other.
 
 use std::collections::HashMap;
+use std::error::Error;
 use std::fmt;
 use std::sync::Arc;
 
@@ -9,36 +10,40 @@ use super::call::{Call, Endpoint, Function, Lost, Scalar, Stepped, Values};
 use super::error::InstanceError;
 use super::{Causality, FmiVersion, Fmu, Kind, Variable, convert};
 
+/// Why a [`Behaviour`] cannot do what was asked: any error, whose message is a clause that follows the
+/// name of the instance's call.
+pub type BehaviourError = Box<dyn Error + Send + Sync>;
+
 /// What computes one instance.
 pub trait Behaviour: Send {
     /// From the inputs to the outputs, both in the order of the description: of a sampled component
     /// at `time`, s, of a continuous one over `[time, time + step]`.
     ///
     /// # Errors
-    /// Why it cannot, as a clause that follows the name of the instance's call.
+    /// Why it cannot.
     fn step(
         &mut self,
         time: f64,
         step: f64,
         inputs: &[f64],
         outputs: &mut [f64],
-    ) -> Result<(), String>;
+    ) -> Result<(), BehaviourError>;
 
     /// Its own state as bytes.
     ///
     /// # Errors
-    /// Why it has none that can be saved, as a clause.
-    fn save(&mut self) -> Result<Vec<u8>, String>;
+    /// Why it has none that can be saved.
+    fn save(&mut self) -> Result<Vec<u8>, BehaviourError>;
 
     /// Goes back to a state that [`Behaviour::save`] gave.
     ///
     /// # Errors
-    /// Why it cannot, as a clause.
-    fn restore(&mut self, state: &[u8]) -> Result<(), String>;
+    /// Why it cannot.
+    fn restore(&mut self, state: &[u8]) -> Result<(), BehaviourError>;
 }
 
 /// Makes what computes the instance of that name.
-pub type Begin = dyn Fn(&str) -> Result<Box<dyn Behaviour>, String> + Send + Sync;
+pub type Begin = dyn Fn(&str) -> Result<Box<dyn Behaviour>, BehaviourError> + Send + Sync;
 
 /// How the instances of an FMU are computed in place of its library.
 #[derive(Clone)]
@@ -110,7 +115,7 @@ impl Computed {
     pub(super) fn new(stand_in: &StandIn, fmu: &Fmu, name: &str) -> Result<Self, InstanceError> {
         let description = &fmu.description;
         let mut computed = Self {
-            behaviour: (stand_in.0)(name).map_err(|reason| InstanceError::StandIn { reason })?,
+            behaviour: (stand_in.0)(name).map_err(InstanceError::StandIn)?,
             version: description.version,
             slots: HashMap::new(),
             inputs: Vec::new(),
@@ -181,14 +186,14 @@ impl Computed {
     fn run(&mut self, time: f64, step: f64) -> Result<(), Lost> {
         let (inputs, outputs) = (&self.inputs, &mut self.outputs);
         let stepped = self.behaviour.step(time, step, inputs, outputs);
-        stepped.map_err(Lost)
+        stepped.map_err(lost)
     }
 
     /// The values and the own state as bytes.
     fn state(&mut self) -> Result<Vec<u8>, Lost> {
         let values = self.inputs.iter().chain(&self.outputs);
         let mut bytes: Vec<u8> = values.flat_map(|value| value.to_le_bytes()).collect();
-        bytes.extend(self.behaviour.save().map_err(Lost)?);
+        bytes.extend(self.behaviour.save().map_err(lost)?);
         Ok(bytes)
     }
 
@@ -197,7 +202,7 @@ impl Computed {
         let Some((values, own)) = bytes.split_at_checked(8 * count) else {
             return Err(Lost("is given a state of another component".to_string()));
         };
-        self.behaviour.restore(own).map_err(Lost)?;
+        self.behaviour.restore(own).map_err(lost)?;
         let places = self.inputs.iter_mut().chain(&mut self.outputs);
         for (place, bytes) in places.zip(values.chunks_exact(8)) {
             let mut value = [0; 8];
@@ -206,6 +211,10 @@ impl Computed {
         }
         Ok(())
     }
+}
+
+fn lost(error: BehaviourError) -> Lost {
+    Lost(error.to_string())
 }
 
 impl Endpoint for Computed {

@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-use fmi_import::{Behaviour, Fmu, Instance, Kind, Options, State};
+use fmi_import::{Behaviour, BehaviourError, Fmu, Instance, Kind, Options, State};
 use zip::{ZipWriter, write::SimpleFileOptions};
 
 const DESCRIPTION: &str = r#"<fmiModelDescription fmiVersion="3.0" modelName="Sum" instantiationToken="1">
@@ -34,7 +34,7 @@ impl Behaviour for Sum {
         step: f64,
         inputs: &[f64],
         outputs: &mut [f64],
-    ) -> Result<(), String> {
+    ) -> Result<(), BehaviourError> {
         if inputs[0] > 100.0 {
             return Err("has an input above 100".into());
         }
@@ -44,11 +44,11 @@ impl Behaviour for Sum {
         Ok(())
     }
 
-    fn save(&mut self) -> Result<Vec<u8>, String> {
+    fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
         Ok([self.total.to_le_bytes(), self.steps.to_le_bytes()].concat())
     }
 
-    fn restore(&mut self, state: &[u8]) -> Result<(), String> {
+    fn restore(&mut self, state: &[u8]) -> Result<(), BehaviourError> {
         let (total, steps) = state.split_at(8);
         self.total = f64::from_le_bytes(total.try_into().map_err(|_| "has no total")?);
         self.steps = f64::from_le_bytes(steps.try_into().map_err(|_| "has no steps")?);
@@ -149,7 +149,7 @@ fn reasons_of_what_computes_reach_the_caller() {
         "{failed}"
     );
 
-    let begin = Arc::new(|name: &str| Err(format!("`{name}` has no function")));
+    let begin = Arc::new(|name: &str| Err(format!("`{name}` has no function").into()));
     let fmu = Arc::new(fmu(folder.path()).computed_by(&[], true, begin));
     let Err(refused) = Instance::new(&fmu, "sum", &Options::default()) else {
         panic!("an instance");

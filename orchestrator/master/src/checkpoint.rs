@@ -1,5 +1,7 @@
 //! A run between two steps, kept so that another process can go on with it to the bit.
 
+use std::error::Error;
+
 use serde::{Deserialize, Serialize};
 
 use super::run::Tripped;
@@ -36,8 +38,9 @@ struct PartState {
     spent: f64,
 }
 
-/// Whoever keeps checkpoints, with the record until then; gives what went wrong.
-pub type KeepCheckpoint = Box<dyn FnMut(&Checkpoint, &Record) -> Result<(), String> + Send>;
+/// Whoever keeps checkpoints, with the record until then; gives what went wrong, any error.
+pub type KeepCheckpoint =
+    Box<dyn FnMut(&Checkpoint, &Record) -> Result<(), Box<dyn Error + Send + Sync>> + Send>;
 
 /// Checkpoints during a run.
 pub(super) struct Keeper {

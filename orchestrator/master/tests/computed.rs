@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-use fmi_import::{Behaviour, Fmu, Options};
+use fmi_import::{Behaviour, BehaviourError, Fmu, Options};
 use fmi_master::{
     Algorithm, Column, Ended, Ending, Outcome, Pace, Plan, Samples, Simulation, VariableStep,
 };
@@ -55,21 +55,21 @@ impl Behaviour for Integrator {
         step: f64,
         inputs: &[f64],
         outputs: &mut [f64],
-    ) -> Result<(), String> {
+    ) -> Result<(), BehaviourError> {
         let next = self.y + step * self.gain * 1e-3 * inputs[0];
         if next.abs() > self.limit {
-            return Err(format!("leaves its limit of {} m", self.limit));
+            return Err(format!("leaves its limit of {} m", self.limit).into());
         }
         self.y = next;
         outputs[0] = self.y;
         Ok(())
     }
 
-    fn save(&mut self) -> Result<Vec<u8>, String> {
+    fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
         Ok(self.y.to_le_bytes().to_vec())
     }
 
-    fn restore(&mut self, state: &[u8]) -> Result<(), String> {
+    fn restore(&mut self, state: &[u8]) -> Result<(), BehaviourError> {
         self.y = f64::from_le_bytes(state.try_into().map_err(|_| "has another state")?);
         Ok(())
     }
@@ -79,16 +79,22 @@ impl Behaviour for Integrator {
 struct Law;
 
 impl Behaviour for Law {
-    fn step(&mut self, _: f64, _: f64, inputs: &[f64], outputs: &mut [f64]) -> Result<(), String> {
+    fn step(
+        &mut self,
+        _: f64,
+        _: f64,
+        inputs: &[f64],
+        outputs: &mut [f64],
+    ) -> Result<(), BehaviourError> {
         outputs[0] = -RATE * 1e-3 * inputs[0];
         Ok(())
     }
 
-    fn save(&mut self) -> Result<Vec<u8>, String> {
+    fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
         Ok(Vec::new())
     }
 
-    fn restore(&mut self, _: &[u8]) -> Result<(), String> {
+    fn restore(&mut self, _: &[u8]) -> Result<(), BehaviourError> {
         Ok(())
     }
 }

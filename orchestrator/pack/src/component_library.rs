@@ -94,3 +94,93 @@ impl ComponentLibrary {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::process::Command;
+
+    /// A library of this source, as the compiler makes it.
+    fn library(folder: &Path, name: &str, source: &str) -> PathBuf {
+        let file = folder.join(format!("{name}.rs"));
+        std::fs::write(&file, source).unwrap();
+        let library = folder.join(format!("{name}.{}", std::env::consts::DLL_EXTENSION));
+        let compiler = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
+        let made = Command::new(compiler)
+            .args(["--edition", "2024", "--crate-type", "cdylib", "-o"])
+            .arg(&library)
+            .arg(&file)
+            .output()
+            .unwrap();
+        let told = String::from_utf8_lossy(&made.stderr);
+        assert!(made.status.success(), "{told}");
+        library
+    }
+
+    /// Text 4 is missing, text 2 is a mistake if `is_wrong`; the library counts the texts that are not freed.
+    fn source(is_wrong: bool) -> String {
+        let xml = if is_wrong { "error: no unit" } else { "<two/>" };
+        format!(
+            r#"
+use std::ffi::{{CString, c_char}};
+use std::sync::atomic::{{AtomicI32, Ordering}};
+static KEPT: AtomicI32 = AtomicI32::new(0);
+#[unsafe(no_mangle)]
+pub extern "C" fn shakebench_describe(what: i32) -> *mut c_char {{
+    let text = match what {{
+        0 => "<html/>".to_string(),
+        1 => "Own".to_string(),
+        2 => "{xml}".to_string(),
+        3 => "<three/>".to_string(),
+        4 => format!("{{}} are kept", KEPT.load(Ordering::Relaxed)),
+        _ => return std::ptr::null_mut(),
+    }};
+    KEPT.fetch_add(1, Ordering::Relaxed);
+    CString::new(text).unwrap().into_raw()
+}}
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn shakebench_free_text(text: *mut c_char) {{
+    KEPT.fetch_sub(1, Ordering::Relaxed);
+    drop(unsafe {{ CString::from_raw(text) }});
+}}
+"#
+        )
+    }
+
+    #[test]
+    fn a_component_describes_itself_and_frees_its_texts() {
+        let folder = tempfile::tempdir().unwrap();
+        let own = library(folder.path(), "own", &source(false));
+        let own = ComponentLibrary::open(&own).unwrap();
+        let texts = own.describe().unwrap();
+        assert_eq!(
+            [
+                texts.name,
+                texts.documentation,
+                texts.fmi2,
+                texts.fmi3,
+                texts.terminals
+            ],
+            ["Own", "<html/>", "<two/>", "<three/>", "0 are kept"]
+        );
+        let told = own.text(5).unwrap_err().to_string();
+        assert!(told.ends_with("gave no description"), "{told}");
+    }
+
+    #[test]
+    fn a_library_that_is_not_a_component_is_refused_by_its_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let told = |file: &Path| {
+            let described = ComponentLibrary::open(file).and_then(|own| own.describe());
+            let told = described.err().unwrap().to_string();
+            let name = file.display().to_string();
+            assert!(told.contains(&name), "{told}");
+            told
+        };
+        let wrong = library(folder.path(), "wrong", &source(true));
+        assert!(told(&wrong).ends_with(": no unit"));
+        let other = library(folder.path(), "other", "");
+        assert!(told(&other).contains("`fmu_kit::export!` is missing"));
+        told(&folder.path().join("none"));
+    }
+}

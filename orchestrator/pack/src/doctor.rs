@@ -78,7 +78,8 @@ pub fn examine(installation: &Installation) -> Examination {
     findings.extend(components(installation));
     findings.push(own_process(installation));
     findings.push(cargo());
-    findings.extend(packages());
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_string());
+    findings.extend(packages(&python));
     findings.push(opensees());
     Examination {
         shakebench: VERSION,
@@ -158,10 +159,28 @@ fn components(installation: &Installation) -> Vec<Finding> {
         _ => (State::Good, None),
     };
     let mut findings = vec![finding("components", state, counted, cure)];
+    let (faults, platforms) = tallied(all.iter().map(|fmu| load(fmu, installation)));
+    let hint = "install again; if a library cannot be mapped, set TMPDIR to a folder from which \
+        programs may run";
+    findings.extend(
+        faults
+            .into_iter()
+            .map(|fault| finding("component", State::Bad, fault, Some(hint))),
+    );
+    if let Some(platforms) = platforms {
+        findings.push(finding("platforms", State::Good, platforms, None));
+    }
+    findings
+}
+
+/// What is wrong with components, and the number of those that can be loaded by platform, in a clause.
+fn tallied<E: ToString>(
+    loaded: impl Iterator<Item = Result<Vec<String>, E>>,
+) -> (Vec<String>, Option<String>) {
     let mut platforms: BTreeMap<String, usize> = BTreeMap::new();
     let mut faults = Vec::new();
-    for fmu in all {
-        match load(fmu, installation) {
+    for outcome in loaded {
+        match outcome {
             Ok(found) => {
                 for platform in found {
                     *platforms.entry(platform).or_default() += 1;
@@ -170,21 +189,11 @@ fn components(installation: &Installation) -> Vec<Finding> {
             Err(error) => faults.push(error.to_string()),
         }
     }
-    let hint = "install again; if a library cannot be mapped, set TMPDIR to a folder from which \
-        programs may run";
-    findings.extend(
-        faults
-            .into_iter()
-            .map(|fault| finding("component", State::Bad, fault, Some(hint))),
-    );
-    let counted: Vec<String> = platforms
+    let counted = platforms
         .iter()
-        .map(|(platform, count)| format!("{platform} ({count})"))
-        .collect();
-    if !counted.is_empty() {
-        findings.push(finding("platforms", State::Good, counted.join(", "), None));
-    }
-    findings
+        .map(|(platform, count)| format!("{platform} ({count})"));
+    let counted = counted.collect::<Vec<_>>().join(", ");
+    (faults, Some(counted).filter(|counted| !counted.is_empty()))
 }
 
 /// The platforms of a component that is whole and can be instantiated here.
@@ -234,13 +243,13 @@ fn cargo() -> Finding {
     }
 }
 
-fn packages() -> Vec<Finding> {
-    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_string());
+/// The packages of the interpreter `python`.
+fn packages(python: &str) -> Vec<Finding> {
     PACKAGES
         .into_iter()
         .map(|(package, needed_for, wanted)| {
             let script = format!("import importlib.metadata as m; print(m.version('{package}'))");
-            let version = first_line(Command::new(&python).args(["-c", &script]));
+            let version = first_line(Command::new(python).args(["-c", &script]));
             Finding {
                 part: package,
                 state: found_or_absent(version.is_some()),
@@ -349,6 +358,64 @@ mod tests {
         assert_eq!(
             (process.state, process.cure.as_deref()),
             (State::Absent, Some("run with --isolate none"))
+        );
+    }
+
+    #[test]
+    fn platforms_are_counted_over_the_components_that_load() {
+        let all = |platforms: &[&str]| -> Result<Vec<String>, String> {
+            Ok(platforms.iter().map(|own| (*own).to_string()).collect())
+        };
+        let (faults, platforms) = tallied(
+            [
+                all(&["x86_64-windows", "x86_64-linux"]),
+                Err("One.fmu: is damaged".to_string()),
+                all(&["x86_64-linux"]),
+                all(&["x86_64-linux"]),
+            ]
+            .into_iter(),
+        );
+        assert_eq!(faults, ["One.fmu: is damaged"]);
+        let platforms = platforms.unwrap();
+        assert_eq!(platforms, "x86_64-linux (3), x86_64-windows (1)");
+        let (faults, platforms) = tallied(std::iter::once(Err("no library")));
+        assert_eq!((faults, platforms), (vec!["no library".to_string()], None));
+    }
+
+    /// The interpreter is a script that has some packages, in versions that it makes of their names.
+    #[cfg(unix)]
+    #[test]
+    fn packages_are_those_of_the_interpreter() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let python = folder.path().join("python");
+        let script = "#!/bin/sh\ncase \"$2\" in\n*version\\(\\'fmpy\\'\\)*) echo 0.3.2;;\n\
+            *version\\(\\'shakebench\\'\\)*) echo 0.1.0; echo more;;\n*) echo lost; exit 1;;\nesac\n";
+        std::fs::write(&python, script).unwrap();
+        std::fs::set_permissions(&python, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let python = python.to_str().unwrap();
+        let table: Vec<String> = packages(python)
+            .iter()
+            .map(|own| {
+                let cure = own.cure.as_deref().unwrap_or("nothing to do");
+                format!(
+                    "{} | {:?} | {} | {} | {cure}",
+                    own.part, own.state, own.found, own.needed_for
+                )
+                .replace(python, "PYTHON")
+            })
+            .collect();
+        assert_eq!(
+            table,
+            [
+                "fmpy | Good | 0.3.2, of PYTHON | running the FMUs from Python | nothing to do",
+                "ecospy | Absent | not found by PYTHON | running the FMUs in ecos | PYTHON -m pip \
+                 install ecospy tbb",
+                "libcosimpy | Absent | not found by PYTHON | running the FMUs in libcosim | PYTHON -m \
+                 pip install libcosimpy",
+                "shakebench | Good | 0.1.0, of PYTHON | driving this program from Python | nothing to \
+                 do",
+            ]
         );
     }
 

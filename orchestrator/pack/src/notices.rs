@@ -260,6 +260,39 @@ fn licence_files(package: &Package) -> Vec<String> {
 mod tests {
     use super::*;
 
+    /// Expressions of SPDX, and the slash that older crates write.
+    #[test]
+    fn a_crate_offers_mit_where_it_is_one_of_its_choices() {
+        let package = |licence: Option<&str>| Package {
+            id: String::new(),
+            targets: Vec::new(),
+            dependencies: Vec::new(),
+            features: HashMap::new(),
+            name: String::new(),
+            version: String::new(),
+            license: licence.map(str::to_string),
+            repository: None,
+            source: None,
+            manifest_path: PathBuf::new(),
+        };
+        for (licence, offers) in [
+            ("MIT", true),
+            ("Apache-2.0 OR MIT", true),
+            ("MIT OR Apache-2.0 OR Zlib", true),
+            ("MIT/Apache-2.0", true),
+            ("Unlicense / MIT", true),
+            ("Apache-2.0", false),
+            ("MITNFA", false),
+            ("MIT AND Zlib", false),
+            ("MIT AND Zlib OR MIT", false),
+            ("(MIT OR Apache-2.0) AND Unicode-3.0", false),
+            ("MIT OR (Apache-2.0)", false),
+        ] {
+            assert_eq!(offers_mit(&package(Some(licence))), offers, "{licence}");
+        }
+        assert!(!offers_mit(&package(None)));
+    }
+
     #[test]
     fn equal_texts_stand_once_and_what_is_not_linked_not_at_all() {
         let folder = tempfile::tempdir().unwrap();

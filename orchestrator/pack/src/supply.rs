@@ -305,6 +305,40 @@ mod tests {
         assert_ne!(own, Installation::default());
     }
 
+    fn sound(path: &Path, version: FmiVersion) {
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let text = format!(
+            r#"<a generationTool="fmu-kit 1" version="{VERSION}" fmiVersion="{version}"/>"#
+        );
+        let entries = [("modelDescription.xml".to_string(), text.into_bytes())];
+        crate::write_archive(path, &entries.into(), None).unwrap();
+    }
+
+    #[test]
+    fn a_component_is_found_by_name_and_version() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |file: &str| folder.path().join(file);
+        sound(&place("fmi2/One.fmu"), FmiVersion::V2);
+        sound(&place("fmi3/One.fmu"), FmiVersion::V3);
+        sound(&place("fmi2/Two.fmu"), FmiVersion::V2);
+        let own = Installation::new(Some(folder.path().into()), None);
+        for (name, version, file) in [
+            ("One", FmiVersion::V2, "fmi2/One.fmu"),
+            ("One", FmiVersion::V3, "fmi3/One.fmu"),
+            ("Two", FmiVersion::V2, "fmi2/Two.fmu"),
+        ] {
+            let found = own.component(name, version).unwrap();
+            assert_eq!((&*found.name, found.version), (name, version));
+            assert_eq!(found.path, place(file));
+        }
+        // There is none of FMI 3.0, whose components alone are proposed.
+        let told = own.component("Two", FmiVersion::V3).unwrap_err();
+        let folder = place("fmi3").display().to_string();
+        let expected =
+            format!("`Two` is neither a path to an .fmu file nor a component in {folder}");
+        assert!(told.to_string().starts_with(&expected), "{told}");
+    }
+
     #[test]
     fn an_fmu_of_another_program_version_or_tool_is_unfit() {
         let folder = tempfile::tempdir().unwrap();

@@ -5,8 +5,9 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
+use super::quantity::ValueError;
 use laboratory::error::Error;
-use pack::{self, FmiVersion, Platform, UnknownPlatform};
+use pack::{self, FmiVersion, Platform};
 
 /// Options of `shakebench build`.
 #[derive(Debug, Args)]
@@ -48,16 +49,14 @@ pub struct Arguments {
     json: bool,
 }
 
-fn libraries(text: &str) -> Result<(Platform, PathBuf), String> {
-    let (platform, folder) = text
-        .split_once('=')
-        .ok_or("expected PLATFORM=DIR, as in x86_64-windows=DIR")?;
+fn libraries(text: &str) -> Result<(Platform, PathBuf), ValueError> {
+    let expected = ValueError::Expected("PLATFORM=DIR, as in x86_64-windows=DIR");
+    let (platform, folder) = text.split_once('=').ok_or(expected)?;
     let folder = PathBuf::from(folder);
     if !folder.is_dir() {
-        return Err(format!("{}: no such folder", folder.display()));
+        return Err(ValueError::NoFolder(folder));
     }
-    let platform: Result<Platform, UnknownPlatform> = platform.parse();
-    Ok((platform.map_err(|error| error.to_string())?, folder))
+    Ok((platform.parse()?, folder))
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

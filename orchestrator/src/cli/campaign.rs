@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 
 use super::out::{given, installation, units, unused};
+use super::quantity::ValueError;
 use super::{interrupt, progress};
 use laboratory::error::Error;
 use laboratory::results::{Out, Results};
@@ -42,15 +43,11 @@ pub struct Arguments {
     json: bool,
 }
 
-fn range(text: &str) -> Result<std::ops::Range<u64>, String> {
-    let expected = "expected A-B with A < B, such as 0-64";
-    let (from, to) = text.split_once('-').ok_or(expected)?;
-    let from = from.trim().parse().map_err(|_| expected)?;
-    let to = to.trim().parse().map_err(|_| expected)?;
-    match from < to {
-        true => Ok(from..to),
-        false => Err(expected.to_string()),
-    }
+fn range(text: &str) -> Result<std::ops::Range<u64>, ValueError> {
+    let read = |(from, to): (&str, &str)| Some(from.trim().parse().ok()?..to.trim().parse().ok()?);
+    let range = text.split_once('-').and_then(read);
+    let range = range.filter(|range| !range.is_empty());
+    range.ok_or(ValueError::Expected("A-B with A < B, such as 0-64"))
 }
 
 /// Runs a study and writes its table.

@@ -62,6 +62,7 @@ use fmi_import::{FmiVersion, isolation};
 use laboratory::error;
 use pages::report::UnitSystem;
 use progress::Detail;
+use quantity::ValueError;
 
 /// Hydraulic shake tables as FMI components, co-simulated.
 ///
@@ -105,14 +106,15 @@ enum GivenUnits {
 }
 
 impl GivenUnits {
-    fn read(text: &str) -> Result<Self, String> {
+    fn read(text: &str) -> Result<Self, ValueError> {
         if text.contains(',') {
             return Ok(Self::Client(text.to_string()));
         }
         let known = UnitSystem::from_str(text, true);
-        known.map(Self::System).map_err(|_| {
-            "expected us or si; of `serve` a length and a force, such as in,kip".to_string()
-        })
+        let expected = "us or si; of `serve` a length and a force, such as in,kip";
+        known
+            .map(Self::System)
+            .map_err(|_| ValueError::Expected(expected))
     }
 }
 
@@ -237,8 +239,8 @@ pub fn main() -> ExitCode {
     interrupt::survive_full_disks();
     let words = program().get_matches_from(negative::joined(std::env::args_os()));
     let cli = Cli::from_arg_matches(&words).unwrap_or_else(|error| error.exit());
-    if let Err(reason) = settings::agree(&words) {
-        eprintln!("error: {reason}");
+    if let Err(twice) = settings::agree(&words) {
+        eprintln!("error: {twice}");
         return ExitCode::from(2);
     }
     progress::choose(match (cli.quiet, cli.verbose) {

@@ -110,7 +110,7 @@ pub fn identified(
     let mut warnings = Vec::new();
     match &interaction {
         Ok(found) => warnings.extend(found.warnings()),
-        Err(reason) => warnings.push(reason.clone()),
+        Err(singular) => warnings.push(singular.to_string()),
     }
     for (i, fit) in model
         .fit_percent
@@ -165,9 +165,9 @@ pub fn identified(
 /// A file at fault, a plant that cannot be inverted.
 pub fn designed(path: &Path, json: bool) -> Result<ExitCode, Error> {
     let model = Model::read(path).map_err(fault)?;
-    let found = interaction(&model).map_err(|reason| Error::File {
+    let found = interaction(&model).map_err(|singular| Error::File {
         path: path.into(),
-        reason,
+        reason: singular.to_string(),
     })?;
     if json {
         println!("{}", serde_json::json!(found));

@@ -1,6 +1,26 @@
 //! Numbers with units, as options.
 
+use std::path::PathBuf;
+
 use laboratory::error::Error;
+use pack::UnknownPlatform;
+
+/// A value on the command line that is not of the expected form; the name of the option precedes it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ValueError {
+    /// What was expected instead.
+    #[error("expected {0}")]
+    Expected(&'static str),
+    /// A text that is not a whole number.
+    #[error("expected a whole number from 0 to {}", u64::MAX)]
+    NotWhole,
+    /// A folder that does not exist.
+    #[error("{}: no such folder", .0.display())]
+    NoFolder(PathBuf),
+    /// A platform without a name in FMI.
+    #[error(transparent)]
+    Platform(#[from] UnknownPlatform),
+}
 
 /// A positive quantity; a number alone is in `unit`.
 ///
@@ -75,16 +95,15 @@ pub fn band(given: &[f64]) -> Result<[f64; 2], Error> {
 ///
 /// # Errors
 /// Another thing.
-pub fn whole<T: std::str::FromStr>(text: &str) -> Result<T, String> {
-    let expected = format!("expected a whole number from 0 to {}", u64::MAX);
-    text.parse().map_err(|_| expected)
+pub fn whole<T: std::str::FromStr>(text: &str) -> Result<T, ValueError> {
+    text.parse().map_err(|_| ValueError::NotWhole)
 }
 
 /// A whole number above 0.
 ///
 /// # Errors
 /// Another thing.
-pub fn at_least_one(text: &str) -> Result<usize, String> {
+pub fn at_least_one(text: &str) -> Result<usize, ValueError> {
     let number = text.parse().ok().filter(|number| *number > 0);
-    number.ok_or_else(|| "expected a whole number from 1".to_string())
+    number.ok_or(ValueError::Expected("a whole number from 1"))
 }

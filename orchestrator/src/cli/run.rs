@@ -378,7 +378,8 @@ fn keep(
     mut checkpoints: Checkpoints,
     every: usize,
 ) -> Result<(), Error> {
-    let keep: KeepCheckpoint = Box::new(move |moment, record| checkpoints.keep(moment, record));
+    let keep: KeepCheckpoint =
+        Box::new(move |moment, record| Ok(checkpoints.keep(moment, record)?));
     Ok(simulation.keep_checkpoints(every, keep)?)
 }
 

@@ -10,7 +10,7 @@ use bridges::{Admission, Event};
 use clap::{Args, ValueEnum};
 
 use super::out::{self, given, unused};
-use super::quantity::{at_least_one, if_given, positive};
+use super::quantity::{ValueError, at_least_one, if_given, positive};
 use super::rig::RigArguments;
 use super::{OneVersion, interrupt, run};
 use fmi_system::ElementFile;
@@ -44,11 +44,11 @@ enum Move {
 }
 
 /// An address of this machine with a port; `localhost` is 127.0.0.1.
-fn address(text: &str) -> Result<SocketAddr, String> {
+fn address(text: &str) -> Result<SocketAddr, ValueError> {
     let port = text.strip_prefix("localhost:");
     let whole = port.map_or(text.to_string(), |port| format!("127.0.0.1:{port}"));
-    let expected = "expected an address and a port up to 65535, such as 127.0.0.1:8090";
-    whole.parse().map_err(|_| expected.to_string())
+    let expected = "an address and a port up to 65535, such as 127.0.0.1:8090";
+    whole.parse().map_err(|_| ValueError::Expected(expected))
 }
 
 /// Options of `shakebench serve`.

@@ -4,11 +4,23 @@ use std::path::PathBuf;
 
 use clap::ArgMatches;
 
+/// A variable that is set to two values.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("--set: `{name}` is set twice, to `{first}` and to `{second}`; expected one value")]
+pub struct SetTwice {
+    /// The variable.
+    name: String,
+    /// Its first value.
+    first: String,
+    /// Its second value.
+    second: String,
+}
+
 /// Whether no variable is given two values: which of them counts would be a guess.
 ///
 /// # Errors
 /// The variable and its values.
-pub fn agree(words: &ArgMatches) -> Result<(), String> {
+pub fn agree(words: &ArgMatches) -> Result<(), SetTwice> {
     let Some((_, command)) = words.subcommand() else {
         return Ok(());
     };
@@ -22,10 +34,11 @@ pub fn agree(words: &ArgMatches) -> Result<(), String> {
             .iter()
             .find(|(other, _)| other.trim() == name.trim());
         if let Some((_, other)) = before.filter(|(_, other)| other != value) {
-            return Err(format!(
-                "--set: `{}` is set twice, to `{other}` and to `{value}`; expected one value",
-                name.trim()
-            ));
+            return Err(SetTwice {
+                name: name.trim().to_string(),
+                first: (*other).to_string(),
+                second: (*value).to_string(),
+            });
         }
     }
     Ok(())

@@ -162,12 +162,9 @@ impl Flat<'_> {
         for binding in &system.bindings {
             self.bind(binding, place, Some(system), None)?;
         }
+        // In the description that refers to the system, at the same path.
         for (binding, place_of_binding) in more {
-            let target = Place {
-                path: place.path.clone(),
-                ..place_of_binding.clone()
-            };
-            self.bind(binding, &target, Some(system), None)?;
+            self.bind(binding, place_of_binding, Some(system), None)?;
         }
         Ok(())
     }

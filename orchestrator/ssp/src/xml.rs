@@ -139,3 +139,44 @@ pub(super) fn flag(node: Node, name: &str) -> Result<bool, Fault> {
             .ok_or_else(|| fault(node, format!("{name}=\"{text}\" is neither true nor false"))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_is_that_of_the_elements_alone() {
+        for (text, depth) in [
+            ("", 0),
+            ("<a/>", 0),
+            ("<a></a>", 1),
+            (
+                "<?xml version=\"1.0\"?><!-- <x> --><a><b/><c><d></d></c></a>",
+                4,
+            ),
+            ("<a><b></b><b></b><b></b></a>", 2),
+            ("<a x='1'\n y='2'><b z='/'/></a>", 1),
+        ] {
+            assert_eq!(deepest(text), depth, "{text}");
+        }
+        let nested = |depth: usize| "<a>".repeat(depth) + &"</a>".repeat(depth);
+        assert!(parse(&nested(DEEPEST)).is_ok());
+        assert!(parse(&nested(DEEPEST + 1)).is_err());
+    }
+
+    #[test]
+    fn a_fault_has_the_line_of_its_element() {
+        let text = "<a>\n <b/>\n <c\n x='1'/></a>";
+        let document = parse(text).unwrap();
+        let lines: Vec<u32> = document
+            .root_element()
+            .children()
+            .filter(Node::is_element)
+            .map(line)
+            .collect();
+        assert_eq!(lines, [2, 3]);
+        let last = document.root_element().last_element_child().unwrap();
+        let told = fault(last, "is wrong");
+        assert_eq!((told.line, told.reason.as_str()), (Some(3), "is wrong"));
+    }
+}

@@ -7,9 +7,10 @@ use std::error::Error;
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
+use std::sync::Arc;
 
 use fmi_import::FmiVersion;
-use fmi_ssp::export::{Experiment, Player, Start, Supply, contents};
+use fmi_ssp::export::{Contents, Experiment, Player, Start, Supply, contents};
 use fmi_system::{Files, Hop, Passage, System, SystemFile, Transformation, Value, assemble};
 use zip::{ZipWriter, write::SimpleFileOptions};
 
@@ -183,22 +184,41 @@ fn files_of_other_start_values_have_names_of_their_own() {
         algorithm: "in-order".to_string(),
         fmi: FmiVersion::V3,
     };
-    let written = contents(&system, &experiment, &folder.path().join("pair.ssp")).unwrap();
-    let starts = supply.starts.borrow();
+    let out = folder.path().join("pair.ssp");
+    let structure = |written: &Contents| {
+        let text = written.files["SystemStructure.ssd"].clone();
+        String::from_utf8(text).unwrap()
+    };
+    // An FMU of others stays as it is, and its choice is in the archive's values.
+    let written = contents(&system, &experiment, &out).unwrap();
     let names: Vec<&str> = written.files.keys().map(String::as_str).collect();
-    match starts.as_slice() {
-        [] => assert_eq!(names, ["SystemStructure.ssd", "resources/Part.fmu"]),
-        [own] => {
-            assert_eq!((own.name.as_str(), own.value), ("mode", 4.0));
-            let expected = [
-                "SystemStructure.ssd",
-                "resources/Part-2.fmu",
-                "resources/Part.fmu",
-            ];
-            assert_eq!(names, expected);
-        }
-        more => panic!("{more:?}"),
+    assert_eq!(names, ["SystemStructure.ssd", "resources/Part.fmu"]);
+    assert_eq!(*supply.starts.borrow(), []);
+    let value = r#"<ssv:Parameter name="mode"><ssv:Integer value="4"/></ssv:Parameter>"#;
+    assert!(structure(&written).contains(value));
+    // One of the project starts with its choice.
+    let mut system = system;
+    for part in &mut system.components {
+        Arc::make_mut(&mut part.fmu).is_own = true;
     }
+    let experiment = Experiment {
+        supply: &supply,
+        ..experiment
+    };
+    let written = contents(&system, &experiment, &out).unwrap();
+    let chosen = Start {
+        name: "mode".to_string(),
+        value: 4.0,
+    };
+    assert_eq!(*supply.starts.borrow(), [chosen]);
+    let names: Vec<&str> = written.files.keys().map(String::as_str).collect();
+    let expected = [
+        "SystemStructure.ssd",
+        "resources/Part-2.fmu",
+        "resources/Part.fmu",
+    ];
+    assert_eq!(names, expected);
+    assert!(!structure(&written).contains("\"mode\""));
 }
 
 /// A description with two components and a system within, whose connections are `inner` and `outer`.
@@ -254,6 +274,30 @@ fn values_go_through_systems_within_in_either_direction() {
 }
 
 #[test]
+fn a_component_without_connectors_has_those_of_its_fmu_and_a_system_has_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("SystemStructure.ssd");
+    let links = |end: &str| {
+        let text = format!(
+            r#"<ssd:SystemStructureDescription version="1.0" name="pair"
+            xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"><ssd:System name="root"><ssd:Elements>
+            <ssd:Component name="a" source="a.fmu"/><ssd:Component name="b" source="b.fmu"/>
+            <ssd:System name="s"/></ssd:Elements><ssd:Connections>
+            <ssd:Connection startElement="a" startConnector="y" {end}/>
+            </ssd:Connections></ssd:System></ssd:SystemStructureDescription>"#
+        );
+        std::fs::write(&path, text).unwrap();
+        let read = fmi_ssp::read(&path.to_string_lossy());
+        read.map(|file| file.connections[0].to_string())
+            .map_err(|error| error.to_string())
+    };
+    let found = links(r#"endElement="b" endConnector="u""#).unwrap();
+    assert_eq!(found, "a.y -> b.u");
+    let told = links(r#"endElement="s" endConnector="u""#).unwrap_err();
+    assert!(told.contains("`s` has no connector `u`"), "{told}");
+}
+
+#[test]
 fn connections_that_do_not_hold_are_refused_with_their_ends() {
     let folder = tempfile::tempdir().unwrap();
     let through = r#"<ssd:Connection startConnector="i" endConnector="o"/>"#;
@@ -294,5 +338,79 @@ fn connections_that_do_not_hold_are_refused_with_their_ends() {
         let said = read(folder.path(), inner, outer).unwrap_err();
         let (_, reason) = said.split_once(": ").unwrap();
         assert!(reason.contains(expected), "{said}");
+    }
+}
+
+/// An archive whose element `reference` plays a motion: its FMU is of this model and has this motion.
+fn played(folder: &Path, model: &str, motion: Option<&str>) -> SystemFile {
+    let inner = folder.join("inner.fmu");
+    let description = format!(r#"<fmiModelDescription modelName="{model}"/>"#);
+    let mut files = vec![("modelDescription.xml", description.as_bytes())];
+    files.extend(motion.map(|text| ("resources/motion.csv", text.as_bytes())));
+    zipped(&inner, &files);
+    let structure = r#"<ssd:SystemStructureDescription version="1.0" name="pair"
+        xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"><ssd:System name="root"><ssd:Elements>
+        <ssd:Component name="reference" source="resources/R.fmu"/><ssd:Component name="a" source="resources/A.fmu"/>
+        </ssd:Elements><ssd:Connections>
+        <ssd:Connection startElement="reference" startConnector="displacement" endElement="a" endConnector="x"/>
+        <ssd:Connection startElement="reference" startConnector="velocity_before" endElement="a" endConnector="v"/>
+        </ssd:Connections></ssd:System></ssd:SystemStructureDescription>"#;
+    let path = folder.join("pair.ssp");
+    let fmu = std::fs::read(&inner).unwrap();
+    zipped(
+        &path,
+        &[
+            ("SystemStructure.ssd", structure.as_bytes()),
+            ("resources/R.fmu", &fmu),
+            ("resources/A.fmu", &fmu),
+        ],
+    );
+    fmi_ssp::read(&path.to_string_lossy()).unwrap()
+}
+
+#[test]
+fn the_motion_of_an_own_archive_becomes_the_reference_and_another_component_gives_its_name_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = |file: &SystemFile| -> Vec<String> { file.components.keys().cloned().collect() };
+    let links = |file: &SystemFile| -> Vec<String> {
+        let mut all: Vec<String> = file.connections.iter().map(ToString::to_string).collect();
+        all.sort();
+        all
+    };
+    let motion = "time,displacement,velocity,acceleration\n0,1,2,3\n0.01,4,5,6\n";
+    let own = played(folder.path(), "ReferenceMotion", Some(motion));
+    assert_eq!(names(&own), ["a"]);
+    assert_eq!(
+        links(&own),
+        [
+            "reference.displacement -> a.x",
+            "reference.velocity[-1] -> a.v"
+        ]
+    );
+    // The samples stay, under names with units.
+    let table = own.experiment.reference.clone().unwrap();
+    let table = own.directory.as_ref().unwrap().join(table);
+    assert_eq!(
+        std::fs::read_to_string(table).unwrap(),
+        "time [s],displacement [m],velocity [m/s],acceleration [m/s2]\n0,1,2,3\n0.01,4,5,6\n"
+    );
+    assert!(own.notes.is_empty(), "{:?}", own.notes);
+    for (model, motion) in [("Other", Some(motion)), ("ReferenceMotion", None)] {
+        let other = played(folder.path(), model, motion);
+        assert_eq!(names(&other), ["a", "reference_"]);
+        assert_eq!(
+            links(&other),
+            [
+                "reference_.displacement -> a.x",
+                "reference_.velocity_before -> a.v"
+            ]
+        );
+        assert_eq!(other.experiment.reference, None);
+        assert_eq!(
+            other.notes,
+            [
+                "the component `reference` is renamed `reference_`, because `reference` is the motion"
+            ]
+        );
     }
 }

@@ -139,8 +139,9 @@ impl Platform {
         directions: &str,
         free: &str,
     ) -> Result<Self, ModelError> {
-        let actuators = text::actuators(points, bases, directions).map_err(refused)?;
-        let free = text::axes(free).map_err(refused)?;
+        let wrong = |error: text::TextError| refused(error.to_string());
+        let actuators = text::actuators(points, bases, directions).map_err(wrong)?;
+        let free = text::axes(free).map_err(wrong)?;
         Self::new(actuators, free)
     }
 

@@ -2,7 +2,7 @@
 
 use std::ffi::c_int;
 
-use fmi_import::Behaviour;
+use fmi_import::{Behaviour, BehaviourError};
 
 /// Functions of the caller's. Each takes the number of a component and gives 0 where it went well.
 #[derive(Debug, Clone, Copy)]
@@ -28,10 +28,10 @@ pub struct Callback {
 /// The caller keeps the reason.
 const RAISED: &str = "raised an exception";
 
-fn done(status: c_int) -> Result<(), String> {
+fn done(status: c_int) -> Result<(), BehaviourError> {
     match status {
         0 => Ok(()),
-        _ => Err(RAISED.to_string()),
+        _ => Err(RAISED.into()),
     }
 }
 
@@ -42,7 +42,7 @@ impl Behaviour for Callback {
         step: f64,
         inputs: &[f64],
         outputs: &mut [f64],
-    ) -> Result<(), String> {
+    ) -> Result<(), BehaviourError> {
         let (inputs, outputs) = (inputs.as_ptr(), outputs.as_mut_ptr());
         done((self.callbacks.step)(
             self.number,
@@ -53,15 +53,15 @@ impl Behaviour for Callback {
         ))
     }
 
-    fn save(&mut self) -> Result<Vec<u8>, String> {
+    fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
         let count = (self.callbacks.save)(self.number);
-        let count = usize::try_from(count).map_err(|_| RAISED.to_string())?;
+        let count = usize::try_from(count).map_err(|_| RAISED)?;
         let mut state = vec![0; count];
         done((self.callbacks.write)(self.number, state.as_mut_ptr()))?;
         Ok(state)
     }
 
-    fn restore(&mut self, state: &[u8]) -> Result<(), String> {
+    fn restore(&mut self, state: &[u8]) -> Result<(), BehaviourError> {
         let (bytes, count) = (state.as_ptr(), state.len() as u64);
         done((self.callbacks.restore)(self.number, bytes, count))
     }

@@ -171,7 +171,9 @@ fn hidden(arguments: &Vrths, study: Study, out: Option<&Out>) -> Result<ExitCode
     };
     let read = arguments.hidden.iter().map(|text| read_hidden(text));
     let hidden = HiddenStudy {
-        hidden: read.collect::<Result<_, _>>().map_err(refused)?,
+        hidden: read
+            .collect::<Result<_, _>>()
+            .map_err(|error| refused(error.to_string()))?,
         cases: study.cases,
         motions: study.motions,
         controllers: study.controllers,

@@ -69,6 +69,38 @@ pub enum HiddenError {
     Record(#[from] identification::IdentificationError),
 }
 
+/// A `--hidden` that is not understood.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadHiddenError {
+    /// The benchmark's rig is not described.
+    #[error(transparent)]
+    Description(#[from] DescriptionError),
+    /// No `=`.
+    #[error("`{text}`: expected EFFECT=VALUE, such as delay=1 ms; effects are {}", effects.join(", "))]
+    Form {
+        /// What was given.
+        text: String,
+        /// Names of the effects.
+        effects: Vec<String>,
+    },
+    /// An effect that the rig does not have.
+    #[error("`{name}` is not an effect of the transfer system{hint}")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// What may have been meant.
+        hint: String,
+    },
+    /// A value in a unit of another quantity, or none.
+    #[error("`{text}`: {source}")]
+    Value {
+        /// What was given.
+        text: String,
+        /// What is wrong with the value.
+        source: units::UnitError,
+    },
+}
+
 /// An effect and its value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HiddenEffect {
@@ -353,22 +385,26 @@ impl HiddenOutcome {
 ///
 /// # Errors
 /// No `=`, an unknown effect, a value in a unit of another quantity.
-pub fn read_hidden(text: &str) -> Result<(String, f64), String> {
-    let rig = TransferSystemRig::benchmark().map_err(|error| error.to_string())?;
+pub fn read_hidden(text: &str) -> Result<(String, f64), ReadHiddenError> {
+    let rig = TransferSystemRig::benchmark()?;
     let names: Vec<&str> = rig.effects().collect();
     let Some((name, value)) = text.split_once('=') else {
-        return Err(format!(
-            "`{text}`: expected EFFECT=VALUE, such as delay=1 ms; effects are {}",
-            names.join(", ")
-        ));
+        return Err(ReadHiddenError::Form {
+            text: text.to_string(),
+            effects: names.iter().map(ToString::to_string).collect(),
+        });
     };
     let name = name.trim();
     let Some(unit) = rig.unit(name) else {
         let hint = units::hint(name, names.iter().copied());
-        return Err(format!(
-            "`{name}` is not an effect of the transfer system{hint}"
-        ));
+        return Err(ReadHiddenError::Unknown {
+            name: name.to_string(),
+            hint,
+        });
     };
-    let value = units::value_in(value.trim(), unit).map_err(|why| format!("`{text}`: {why}"))?;
+    let value = units::value_in(value.trim(), unit).map_err(|source| ReadHiddenError::Value {
+        text: text.to_string(),
+        source,
+    })?;
     Ok((name.to_string(), value))
 }

@@ -280,3 +280,91 @@ impl Drop for Remote {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A reading of so many Float64 from these variables, learned after a step.
+    fn learn(ahead: &mut Ahead, function: Function, references: &[u32], count: usize) {
+        let mut values = vec![0_u8; 8 * count];
+        let mut call = Call::plain(function);
+        call.references = references;
+        call.count = count;
+        call.values = Values::Out(&mut values);
+        ahead.learn(3, &call);
+    }
+
+    const GET: Function = Function::Get(Scalar::Float64);
+
+    /// After a step in which the guest has answered what it foresaw with `7`.
+    fn stepped(ahead: &mut Ahead) {
+        ahead.answers = ahead.habit.clone();
+        let places: Vec<usize> = parcel::all(&ahead.answers)
+            .map(|(at, head)| at + parcel::values_of(&head))
+            .collect();
+        for at in places {
+            ahead.answers[at..at + 8].copy_from_slice(&7.0_f64.to_ne_bytes());
+        }
+        (ahead.asked, ahead.is_after_step) = (0, true);
+    }
+
+    fn ask(ahead: &mut Ahead, references: &[u32]) -> Option<(i32, f64)> {
+        let mut values = [0_u8; 8];
+        let mut call = Call::plain(GET);
+        call.references = references;
+        call.count = 1;
+        call.values = Values::Out(&mut values);
+        let status = ahead.answer(&mut call)?;
+        Some((status, f64::from_ne_bytes(values)))
+    }
+
+    #[test]
+    fn readings_after_a_step_are_learned_and_answered_in_their_order() {
+        let mut ahead = Ahead::default();
+        // What comes before any step is no habit.
+        learn(&mut ahead, GET, &[1], 1);
+        assert!(ahead.habit.is_empty());
+        stepped(&mut ahead);
+        learn(&mut ahead, GET, &[1], 1);
+        learn(&mut ahead, GET, &[2], 1);
+        let heads: Vec<(u32, u32)> = parcel::all(&ahead.habit)
+            .map(|(_, head)| (head.instance, head.function))
+            .collect();
+        assert_eq!(heads, [(3, GET.number()); 2]);
+        let (second, _) = parcel::all(&ahead.habit).nth(1).unwrap();
+        let place = ahead.place_of(&[2], 1).unwrap();
+        assert!(place > second && place < ahead.habit.len());
+        assert!(ahead.place_of(&[9], 1).is_none() && ahead.place_of(&[2], 2).is_none());
+
+        stepped(&mut ahead);
+        assert_eq!(ask(&mut ahead, &[1]), Some((0, 7.0)));
+        assert_eq!(ask(&mut ahead, &[2]), Some((0, 7.0)));
+        // Each once.
+        assert_eq!(ask(&mut ahead, &[2]), None);
+        stepped(&mut ahead);
+        assert_eq!(ask(&mut ahead, &[2]), None);
+    }
+
+    #[test]
+    fn a_habit_ends_where_anything_else_is_called() {
+        let mut ahead = Ahead::default();
+        stepped(&mut ahead);
+        learn(&mut ahead, GET, &[1], 1);
+        learn(&mut ahead, GET, &[2], 1);
+        let both = ahead.habit.len();
+        // The second one is no longer called.
+        stepped(&mut ahead);
+        assert_eq!(ask(&mut ahead, &[1]), Some((0, 7.0)));
+        learn(&mut ahead, Function::Terminate, &[], 0);
+        assert_eq!(ahead.habit.len(), both / 2);
+        assert!(ahead.answers.is_empty() && !ahead.is_after_step);
+        // What follows is not right after the step.
+        learn(&mut ahead, GET, &[5], 1);
+        assert_eq!(ahead.habit.len(), both / 2);
+        // Nor does a reading travel that is larger than all that may wait.
+        stepped(&mut ahead);
+        learn(&mut ahead, GET, &[6], KEPT);
+        assert!(ahead.habit.is_empty() && !ahead.is_after_step);
+    }
+}

@@ -147,4 +147,95 @@ mod tests {
         assert_eq!(shape, sines.shape());
         assert_ne!(shape, Sines { seed: 4, ..sines }.shape());
     }
+
+    #[test]
+    fn a_triangle_is_straight_between_its_corners() {
+        let found = triangle(1.0, 4.0, 0.5);
+        assert_eq!(found, [0.0, 0.5, 1.0, 0.5, 0.0, -0.5, -1.0, -0.5]);
+        assert_eq!(triangle(3.0, 0.0, 0.5), [0.0; 0]);
+    }
+
+    #[test]
+    fn a_motion_fades_over_two_seconds_at_either_end() {
+        let dt = 0.5;
+        let mut values = vec![1.0; 12];
+        fade(&mut values, dt);
+        // A cubic that is level at both ends: 0, 5/32, 1/2 and 27/32.
+        let edge = [0.0, 0.15625, 0.5, 0.84375];
+        assert_eq!(values[..4], edge);
+        assert_eq!(values[4..8], [1.0; 4]);
+        let mut end = values[8..].to_vec();
+        end.reverse();
+        assert_eq!(end, edge);
+        // A short one fades over its halves.
+        let mut short = vec![1.0; 4];
+        fade(&mut short, dt);
+        assert_eq!(short, [0.0, 0.5, 0.5, 0.0]);
+    }
+
+    /// Size of a sine of that frequency in `values`.
+    fn content(values: &[f64], frequency: f64, dt: f64) -> f64 {
+        let turned = values.iter().enumerate().map(|(k, value)| {
+            let (s, c) = (TAU * frequency * k as f64 * dt).sin_cos();
+            [value * c, value * s]
+        });
+        let [re, im] = turned.fold([0.0; 2], |[re, im], [c, s]| [re + c, im + s]);
+        re.hypot(im)
+    }
+
+    #[test]
+    fn lines_are_where_they_are_asked_for_and_of_their_size() {
+        let dt = 0.005;
+        let sines = Sines {
+            band: (1.0, 16.0),
+            lines: Some(3),
+            duration: 40.0,
+            dt,
+            seed: 5,
+        };
+        let shape = sines.shape();
+        assert_eq!(shape.len(), 8000);
+        let size = |frequency: f64| content(&shape, frequency, dt);
+        let wanted = |f: f64| (1.0 + f / 2.0) / (1.0 + (f / 0.5).powi(2));
+        for frequency in [4.0, 16.0] {
+            let ratio = size(frequency) / size(1.0);
+            let expected = wanted(frequency) / wanted(1.0);
+            assert!((ratio / expected - 1.0).abs() < 0.01, "{frequency} Hz");
+        }
+        for frequency in [0.5, 2.0, 8.0, 30.0] {
+            assert!(size(frequency) < 1e-3 * size(1.0), "{frequency} Hz");
+        }
+        // One line has no second one to be spaced from.
+        let one = Sines {
+            lines: Some(1),
+            ..sines
+        };
+        let shape = one.shape();
+        assert!(content(&shape, 16.0, dt) < 1e-3 * content(&shape, 1.0, dt));
+        // All lines of 10 s from 0.45 to 2.04 Hz are those from 0.5 to 2 Hz.
+        let all = Sines {
+            band: (0.45, 2.04),
+            lines: None,
+            duration: 10.0,
+            ..sines
+        };
+        let shape = all.shape();
+        let largest = |from: f64, to: f64| {
+            let places = (0..=20).map(|i| from + (to - from) * f64::from(i) / 20.0);
+            places.fold(0.0, |most: f64, f| most.max(content(&shape, f, dt)))
+        };
+        let inside = largest(0.5, 2.0);
+        assert!(largest(0.05, 0.25) < 0.1 * inside && largest(2.4, 4.0) < 0.1 * inside);
+    }
+
+    #[test]
+    fn a_motion_is_its_shape_times_its_scale_with_its_rates() {
+        let shape: Vec<f64> = (0..5).map(|k| f64::from(k * k)).collect();
+        let own = motion("own", &shape, 0.5, 0.5, Some(7));
+        assert_eq!((own.name.as_str(), own.dt, own.seed), ("own", 0.5, Some(7)));
+        assert_eq!(own.displacement, [0.0, 0.5, 2.0, 4.5, 8.0]);
+        assert_eq!(own.velocity, [1.0, 2.0, 4.0, 6.0, 7.0]);
+        assert_eq!(own.acceleration, [2.0, 3.0, 4.0, 3.0, 2.0]);
+        assert_eq!(motion("point", &[1.0], 1.0, 0.5, None).velocity, [0.0]);
+    }
 }

@@ -225,4 +225,65 @@ mod tests {
         // Its 2.03 ms are the sensors' sample, and a thirtieth of one more.
         assert!(find("command_delay.delay") < 5e-5);
     }
+
+    #[test]
+    fn what_follows_from_other_numbers_follows_them_and_keeps_its_bounds() {
+        let model = ControlModel::commissioned().unwrap();
+        let (mut rig, mut shape) = model.hydraulics.unwrap();
+        let usual = ServoHydraulicTable::default();
+        (rig.command_delay, rig.seal_friction) = (0.005, 120.0);
+        (rig.spool_lag, rig.spool_inertia) = (3e-4, 4e-8);
+        (rig.mass, rig.damping, rig.stiffness) = (900.0, -3.0, 50.0);
+        (shape.excess, shape.presliding, shape.relaxation) = (0.25, 1e-5, 0.5);
+        let curve = ValveCurve {
+            overlap: -0.1,
+            ..ValveCurve::default()
+        };
+        let find = |own: &[(&str, f64)], name: &str| {
+            let found = own.iter().find(|own| own.0 == name).unwrap();
+            found.1
+        };
+        let own = parameters(&rig, &shape, &curve, 0.002);
+        for (name, expected) in [
+            // 1/(2 pi 0.2 ms), and half of 0.3 ms over 0.2 ms.
+            ("valve_frequency", 795.774_715_459_477),
+            ("valve_damping_ratio", 0.75),
+            ("valve_overlap", 0.0),
+            ("coulomb_friction", 120.0),
+            ("static_friction", 150.0),
+            ("seal_stiffness", 1.2e7),
+            ("presliding_damping", 6e6),
+            ("table_mass", 900.0),
+            ("table_damping", 0.0),
+            ("table_stiffness", 50.0),
+            ("command_delay.delay", 0.003),
+        ] {
+            let value = find(&own, name);
+            assert!(
+                (value - expected).abs() <= 1e-12 * expected.abs(),
+                "{name}: {value}"
+            );
+        }
+        // The oil's stiffness is four times its modulus times the area squared over the volume.
+        let (area, volume) = (usual.cylinder.area, usual.cylinder.volume);
+        let bulk = find(&own, "bulk_modulus");
+        let stiffness = 4.0 * bulk * area * area / volume;
+        assert!((stiffness / rig.oil_stiffness - 1.0).abs() < 1e-12);
+        // Leakage over the compliance of half of the oil, less what the valve leaks.
+        let leaks = find(&own, "piston_leakage") + usual.valve.null_leakage;
+        let rate = leaks * 4.0 * bulk / volume;
+        assert!((rate / rig.leakage_rate - 1.0).abs() < 1e-9, "{rate}");
+        // The flow at full opening through half of the supply moves the table at the speed that was found.
+        let supply = usual.supply.rest_pressure(usual.valve.null_leakage);
+        let speed = find(&own, "flow_coefficient") * (supply / 2.0).sqrt() / area;
+        let expected = rig.force_rate / rig.oil_stiffness;
+        assert!((speed / expected - 1.0).abs() < 1e-12, "{speed}");
+        // A damping ratio below 0.05 and a delay below the sensors' are not believed.
+        (rig.spool_lag, rig.command_delay) = (1e-9, 0.001);
+        rig.leakage_rate = 0.0;
+        let own = parameters(&rig, &shape, &curve, 0.002);
+        assert_eq!(find(&own, "valve_damping_ratio"), 0.05);
+        assert_eq!(find(&own, "command_delay.delay"), 0.0);
+        assert_eq!(find(&own, "piston_leakage"), 0.0);
+    }
 }

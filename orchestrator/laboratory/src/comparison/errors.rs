@@ -74,3 +74,58 @@ pub(super) fn read(path: &Path, controller: &str) -> Result<Option<History>, Err
         acceleration_error,
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fmi_master::Ending;
+
+    pub(super) fn row(controller: &str, history: Option<History>) -> Row {
+        Row {
+            record: "wave".into(),
+            controller: controller.into(),
+            time_domain_percent: None,
+            frequency_domain_percent: None,
+            response_spectrum_percent: None,
+            significant_duration_percent: None,
+            peak_displacement_m: None,
+            along_y: None,
+            ended: Ending::Complete,
+            ended_because: None,
+            ended_s: None,
+            history,
+        }
+    }
+
+    #[test]
+    fn errors_over_time_are_a_table_that_is_read_again() {
+        let history = |displacement: &[f64], acceleration: &[f64]| History {
+            dt: 0.25,
+            displacement_error: displacement.to_vec(),
+            acceleration_error: acceleration.to_vec(),
+        };
+        let rows = [
+            row("mpc", Some(history(&[0.5, -1.0], &[2.0, 4.0]))),
+            row("lqg", None),
+            row("preview", Some(history(&[1.0, 2.0, 3.0], &[4.0, 5.0, 6.0]))),
+        ];
+        let text = written(&rows);
+        assert_eq!(
+            text,
+            "time,mpc.displacement_error,mpc.acceleration_error,preview.displacement_error,\
+             preview.acceleration_error\n0,0.5,2,1,4\n0.25,-1,4,2,5\n0.5,,,3,6\n"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(FILE);
+        std::fs::write(&path, text).unwrap();
+        for own in [&rows[0], &rows[2]] {
+            let found = read(&path, &own.controller).unwrap().unwrap();
+            let before = own.history.as_ref().unwrap();
+            assert_eq!(found.dt, before.dt);
+            assert_eq!(found.displacement_error, before.displacement_error);
+            assert_eq!(found.acceleration_error, before.acceleration_error);
+        }
+        assert!(read(&path, "lqg").unwrap().is_none());
+        assert_eq!(written(&rows[1..2]), "time\n");
+    }
+}

@@ -225,3 +225,102 @@ pub(super) fn deviation(values: &[f64]) -> Option<f64> {
     let variance = sum / (count - 1.0);
     (values.len() > 1 && variance.is_finite()).then(|| variance.sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run with an error, and a second axis with an error twice as large; none of one that was stopped.
+    fn row(controller: &str, error: Option<f64>, along_y: Option<f64>) -> Row {
+        Row {
+            record: "wave".into(),
+            controller: controller.into(),
+            time_domain_percent: error,
+            frequency_domain_percent: error.map(|own| 10.0 * own),
+            response_spectrum_percent: error.map(|own| 100.0 * own),
+            significant_duration_percent: error.map(|own| own + 0.5),
+            peak_displacement_m: None,
+            along_y: along_y.map(|own| AlongY {
+                time_domain_percent: Some(own),
+                frequency_domain_percent: None,
+                response_spectrum_percent: Some(2.0 * own),
+                significant_duration_percent: Some(3.0 * own),
+                at_rest_percent: Some(4.0 * own),
+            }),
+            ended: match error {
+                Some(_) => Ending::Complete,
+                None => Ending::Interlock,
+            },
+            ended_because: None,
+            ended_s: None,
+            history: None,
+        }
+    }
+
+    #[test]
+    fn medians_are_by_controller_and_a_stopped_run_is_worse_than_any() {
+        let found = Comparison::new(
+            "rig",
+            "none",
+            vec![
+                row("b", Some(3.0), None),
+                row("a", Some(7.0), None),
+                row("b", None, None),
+                row("a", Some(1.0), None),
+                row("b", Some(1.0), None),
+                row("c", None, None),
+                row("c", Some(1.0), None),
+            ],
+        );
+        assert_eq!(found.controllers(), ["b", "a", "c"]);
+        assert_eq!(found.ended_early().count(), 2);
+        assert!(!found.is_biaxial());
+        let of = |controller: &str| &found.medians[controller];
+        let median = |scale: Option<f64>, ended_early| Median {
+            time_domain_percent: scale,
+            frequency_domain_percent: scale.map(|own| 10.0 * own),
+            response_spectrum_percent: scale.map(|own| 100.0 * own),
+            significant_duration_percent: scale.map(|own| own + 0.5),
+            along_y: None,
+            ended_early,
+        };
+        // Of 1, 3 and the stopped one; of 1 and 7; of 1 and the stopped one.
+        assert_eq!(*of("b"), median(Some(3.0), 1));
+        assert_eq!(*of("a"), median(Some(4.0), 0));
+        assert_eq!(*of("c"), median(None, 1));
+    }
+
+    #[test]
+    fn a_second_axis_has_medians_of_its_own() {
+        let rows = vec![
+            row("a", Some(1.0), Some(2.0)),
+            row("a", Some(1.0), Some(6.0)),
+            row("a", Some(1.0), Some(3.0)),
+        ];
+        let found = Comparison::new("rig", "none", rows);
+        assert!(found.is_biaxial());
+        let expected = AlongY {
+            time_domain_percent: Some(3.0),
+            frequency_domain_percent: None,
+            response_spectrum_percent: Some(6.0),
+            significant_duration_percent: Some(9.0),
+            at_rest_percent: Some(12.0),
+        };
+        assert_eq!(found.medians["a"].along_y, Some(expected));
+    }
+
+    /// As `statistics.median` and `statistics.stdev` of Python give them.
+    #[test]
+    fn median_and_deviation_are_those_of_a_sample() {
+        assert_eq!(median(&[]), None);
+        assert_eq!(median(&[4.0]), Some(4.0));
+        assert_eq!(median(&[5.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&[5.0, 1.0, 2.0, 8.0]), Some(3.5));
+        assert_eq!(median(&[1.0, f64::INFINITY]), None);
+        let own = deviation(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0]).unwrap();
+        assert!((own - 2.138_089_935_299_395).abs() < 1e-14, "{own}");
+        assert_eq!(deviation(&[1.0, 3.0]), Some(2_f64.sqrt()));
+        assert_eq!(deviation(&[1.0]), None);
+        assert_eq!(deviation(&[1.0, f64::INFINITY]), None);
+    }
+}

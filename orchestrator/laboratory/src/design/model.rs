@@ -474,3 +474,19 @@ fn drawn_section(own: &LoopOnModel) -> Section {
         ..Section::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_band_holds_nine_tenths_of_the_draws() {
+        // 0 to 100 in another order.
+        let mut values: Vec<f64> = (0..=100).map(|k| f64::from((37 * k) % 101)).collect();
+        let found = band(&mut values).unwrap();
+        assert_eq!((found.low, found.high), (5.0, 95.0));
+        let one = band(&mut [3.0]).unwrap();
+        assert_eq!((one.low, one.high), (3.0, 3.0));
+        assert!(band(&mut []).is_none());
+    }
+}

@@ -9,13 +9,13 @@ use identification::diagnosis::case::Case;
 use identification::diagnosis::rigs::shake_table::Diagnosis;
 use identification::diagnosis::{DiagnosisReport, Evidence};
 
-use super::co_simulation::{self, Comparison, RigFmus};
+use super::co_simulation::{self, Comparison, PlayError, RigFmus};
 use super::{EXTENDED_MODEL, SEPARATING_MOTION, file_fault};
 use crate::error::Error;
 use crate::results::Results;
 use pack::extended_model::ExtendedModel;
 use pack::parameter_sets::component_of;
-use pack::{FmiVersion, Installation, PackedFmu};
+use pack::{FmiVersion, Installation, PackError, PackedFmu};
 
 /// What a case's diagnosis brings beside its report.
 pub(super) struct Extended {
@@ -118,38 +118,61 @@ fn fmus(
     Ok(built)
 }
 
-/// The validation record against both rigs in closed loop; a sentence if that is impossible.
+/// Why a case is not co-simulated in closed loop.
+#[derive(Debug, thiserror::Error)]
+enum NotPlayed {
+    /// No law to close the loop with.
+    #[error("the case states no law")]
+    NoLaw,
+    /// Nothing to play.
+    #[error("the validation record has no column `reference`")]
+    NoReference,
+    /// A channel that the law needs and the record does not have.
+    #[error("without `{0}` it cannot be checked whether the stated law made the command (R5)")]
+    Unchecked(&'static str),
+    /// Another law than the stated one.
+    #[error("the stated law did not make the recorded command (R5)")]
+    OtherLaw,
+    /// The components of the project cannot be built.
+    #[error(transparent)]
+    Pack(#[from] PackError),
+    /// The project has no component of that name.
+    #[error("there is no component `{0}`")]
+    NoComponent(String),
+    /// The run fails.
+    #[error(transparent)]
+    Play(#[from] PlayError),
+}
+
+/// The validation record against both rigs in closed loop.
 fn in_closed_loop(
     case: &Case,
     found: &Diagnosis,
     extended: &[PackedFmu],
     installation: &Installation,
-) -> Result<Comparison, String> {
+) -> Result<Comparison, NotPlayed> {
     let recording = &case.validation;
-    let law = case.nominal.controller.ok_or("the case states no law")?;
+    let law = case.nominal.controller.ok_or(NotPlayed::NoLaw)?;
     let is_missing = |channel: &Channel| recording.channel(*channel).is_none();
     if is_missing(&Channel::Reference) {
-        return Err("the validation record has no column `reference`".into());
+        return Err(NotPlayed::NoReference);
     }
     let needed = [Channel::Displacement, Channel::Acceleration];
     if let Some(missing) = needed.into_iter().find(is_missing) {
-        return Err(format!(
-            "without `{}` it cannot be checked whether the stated law made the command (R5)",
-            missing.name()
-        ));
+        return Err(NotPlayed::Unchecked(missing.name()));
     }
     if !found.validation.by_law {
-        return Err("the stated law did not make the recorded command (R5)".into());
+        return Err(NotPlayed::OtherLaw);
     }
-    let originals = installation.fmus().map_err(|error| error.to_string())?;
+    let originals = installation.fmus()?;
     let original = |name: &str| {
         let found = find(originals, name).map(|fmu| fmu.path.clone());
-        found.ok_or_else(|| format!("there is no component `{name}`"))
+        found.ok_or_else(|| NotPlayed::NoComponent(name.to_owned()))
     };
     let changed = |name: &str| {
         find(extended, name).map_or_else(|| original(name), |fmu| Ok(fmu.path.clone()))
     };
-    let rig = |file: &dyn Fn(&str) -> Result<PathBuf, String>| -> Result<RigFmus, String> {
+    let rig = |file: &dyn Fn(&str) -> Result<PathBuf, NotPlayed>| -> Result<RigFmus, NotPlayed> {
         Ok(RigFmus {
             table: file("ShakeTable")?,
             specimen: match case.nominal.specimen {
@@ -162,5 +185,12 @@ fn in_closed_loop(
         })
     };
     let before = rig(&original)?.nominal(&case.nominal);
-    co_simulation::compare(recording, &case.nominal, &law, &before, &rig(&changed)?)
+    let after = rig(&changed)?;
+    Ok(co_simulation::compare(
+        recording,
+        &case.nominal,
+        &law,
+        &before,
+        &after,
+    )?)
 }

@@ -507,4 +507,219 @@ mod tests {
             );
         }
     }
+
+    /// A pulse about the middle of `samples`, its second derivative by time, and so many samples.
+    fn pulse(samples: usize, dt: f64) -> (Vec<f64>, Vec<f64>) {
+        let width = 0.15;
+        let at = |k: usize| {
+            let u = (k as f64 - 0.5 * samples as f64) * dt / width;
+            let value = (-u * u).exp();
+            (value, value * (4.0 * u * u - 2.0) / (width * width))
+        };
+        (0..samples).map(at).unzip()
+    }
+
+    fn largest(one: &[f64], other: &[f64]) -> f64 {
+        assert_eq!(one.len(), other.len());
+        let off = one.iter().zip(other).map(|(a, b)| (a - b).abs());
+        off.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn displacement_and_acceleration_of_one_motion_join_to_its_acceleration() {
+        let dt = 0.005;
+        let (displacement, acceleration) = pulse(1200, dt);
+        let still = vec![0.0; 1200];
+        let all = [0.0, 0.5 / dt];
+        let peak = acceleration.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
+        let near = |own: Vec<f64>| largest(&own, &acceleration) < 1e-3 * peak;
+        for crossover in [0.5, 2.0, 20.0] {
+            let own = joined(&displacement, &acceleration, dt, crossover, all);
+            assert!(near(own), "{crossover}");
+        }
+        // Far below the crossover the displacement alone counts, far above the acceleration alone.
+        assert!(near(joined(&displacement, &still, dt, 1e4, all)));
+        assert!(near(joined(&still, &acceleration, dt, 1e-3, all)));
+        let half = joined(&displacement, &still, dt, 2.0, all);
+        assert!(!near(half));
+        // Nothing of it is beyond 20 Hz, and nearly all below 8 Hz.
+        let beyond = joined(&displacement, &acceleration, dt, 2.0, [20.0, 50.0]);
+        assert!(largest(&beyond, &still) < 1e-3 * peak);
+        assert!(near(joined(
+            &displacement,
+            &acceleration,
+            dt,
+            2.0,
+            [0.0, 8.0]
+        )));
+        // As many samples as both have.
+        let short = joined(&displacement[..900], &acceleration, dt, 2.0, all);
+        assert_eq!(short.len(), 900);
+    }
+
+    #[test]
+    fn a_band_ends_within_half_an_octave() {
+        let band = [2.0, 8.0];
+        for (frequency, expected) in [
+            (2.0, 1.0),
+            (4.0, 1.0),
+            (8.0, 1.0),
+            (8.0 * 2_f64.powf(0.25), 0.5),
+            (8.0 * 2_f64.powf(0.5), 0.0),
+            (16.0, 0.0),
+            (2.0 / 2_f64.powf(0.25), 0.5),
+            (1.0, 0.0),
+            (0.0, 0.0),
+            (-4.0, 0.0),
+        ] {
+            let found = inside(frequency, band);
+            assert!((found - expected).abs() < 1e-12, "{frequency}: {found}");
+        }
+        assert_eq!(inside(1e-6, [0.0, 8.0]), 1.0);
+        assert_eq!(inside(0.0, [0.0, 8.0]), 0.0);
+    }
+
+    #[test]
+    fn the_window_rises_and_falls_with_its_own_derivatives() {
+        let (samples, dt) = (2001, 0.001);
+        let at = |n: usize| window(n, samples, dt);
+        assert_eq!(at(0), [0.0; 3]);
+        assert_eq!(at(2000), [0.0; 3]);
+        assert_eq!(at(1000), [1.0, 0.0, 0.0]);
+        // Half way up at half of the edge, alike at both ends.
+        assert!((at(250)[0] - 0.5).abs() < 1e-12);
+        for n in 1..2000 {
+            let [before, own, after] = [at(n - 1), at(n), at(n + 1)];
+            for order in 0..2 {
+                let slope = (after[order] - before[order]) / (2.0 * dt);
+                let size = [4.4, 31.0][order];
+                assert!((slope - own[order + 1]).abs() < 1e-3 * size, "sample {n}");
+            }
+            assert!((own[0] - at(2000 - n)[0]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_history_is_that_of_its_spectrum_and_quiet_follows_it() {
+        let values: Vec<f64> = (0..1000).map(|k| f64::from((k * k) % 17) - 8.0).collect();
+        let again = from_spectrum(spectrum(&values, 1000), 1000);
+        assert!(largest(&values, &again) < 1e-12);
+        // Eight seconds at the least, in thousands.
+        for (samples, dt, expected) in [
+            (1000, 0.01, 2000),
+            (1200, 0.01, 2000),
+            (1201, 0.01, 3000),
+            (1, 0.008, 2000),
+        ] {
+            assert_eq!(padded(samples, dt), expected);
+        }
+    }
+
+    /// Noise of a linear congruential generator, from -0.5 to 0.5.
+    fn noise(samples: usize, seed: u32) -> Vec<f64> {
+        let mut state = seed;
+        let next = |_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+        };
+        (0..samples).map(next).collect()
+    }
+
+    #[test]
+    fn a_response_is_that_of_the_table_and_predicts_it() {
+        let dt = 0.01;
+        let table = |drive: &[f64]| -> Vec<f64> {
+            let at = |k: usize| 0.6 * drive[k] + if k > 0 { 0.3 * drive[k - 1] } else { 0.0 };
+            (0..drive.len()).map(at).collect()
+        };
+        let drives = [noise(6000, 1), noise(5000, 2)];
+        let shown = drives.each_ref().map(|drive| table(drive));
+        let pairs = [0, 1].map(|k| [drives[k].as_slice(), shown[k].as_slice()]);
+        let found = Response::new(&pairs, dt).unwrap();
+        assert_eq!(found.step, 1.0 / SEGMENT);
+        // 0.6 + 0.3 exp(-i w dt), whose gain falls from 0.9 to 0.3.
+        for frequency in [1.0, 10.0, 25.0, 40.0, 49.0] {
+            let turn = Complex64::from_polar(0.3, -TAU * frequency * dt);
+            let off = found.at(frequency) - (turn + 0.6);
+            assert!(off.norm() < 0.02, "{frequency} Hz: {off}");
+        }
+        assert!(found.coherence.iter().all(|own| *own > 0.98));
+        let other = noise(3000, 3);
+        let (predicted, played) = (found.of(&other, dt), table(&other));
+        let rest: Vec<f64> = predicted.iter().zip(&played).map(|(a, b)| a - b).collect();
+        let share = motion::metrics::rms(&rest) / motion::metrics::rms(&played);
+        assert!(share < 0.03, "{share}");
+        // What has nothing to do with the drive is no response.
+        let unrelated = noise(6000, 9);
+        let none = Response::new(&[[&drives[0], &unrelated]], dt).unwrap();
+        let known = none.coherence.iter().filter(|own| **own > 0.0).count();
+        assert!(10 * known < none.coherence.len(), "{known}");
+        assert!(Response::new(&[[&other[..400], &played[..400]]], dt).is_none());
+        assert!(Response::new(&[], dt).is_none());
+    }
+
+    #[test]
+    fn an_inverse_is_limited_where_the_table_hardly_follows() {
+        let turned = Complex64::from_polar(0.1, 0.7);
+        let response = Response {
+            step: 0.5,
+            gain: vec![
+                Complex64::new(1.0, 0.0),
+                Complex64::new(2.0, 0.0),
+                turned,
+                Complex64::new(0.0, 4.0),
+                Complex64::new(1.0, 0.0),
+            ],
+            coherence: vec![1.0, 0.8, 1.0, 0.4, 0.9],
+        };
+        let own = Inverse::of(&response, [0.5, 1.6], 0.5);
+        let expected = [
+            Complex64::new(1.0, 0.0),
+            // Its coherence of its inverse; at most three; none where it is not coherent.
+            Complex64::new(0.4, 0.0),
+            Complex64::from_polar(3.0, -0.7),
+            Complex64::new(0.0, 0.0),
+            Complex64::new(0.9, 0.0),
+        ];
+        for (k, expected) in expected.iter().enumerate() {
+            let off = (own.lines[k] - expected).norm();
+            assert!(off < 1e-12, "line {k}: {}", own.lines[k]);
+        }
+        let shown: Vec<f64> = own.response().iter().map(|line| line.frequency).collect();
+        assert_eq!(shown, [0.5, 1.0, 1.5]);
+        assert!((own.coherence() - (0.8 + 1.0 + 0.4) / 3.0).abs() < 1e-12);
+        assert_eq!(own.corrected_band(), [0.5, 1.0]);
+        // Between lines it is linear; beyond the last there is nothing.
+        assert!((own.at(0.25) - Complex64::new(0.7, 0.0)).norm() < 1e-12);
+        assert_eq!(own.at(2.1), Complex64::new(0.0, 0.0));
+        // Half an octave beyond its band nothing is left.
+        let kept = own.within_band();
+        assert_eq!(kept.lines[0].norm(), 0.0);
+        assert_eq!(kept.lines[1], expected[1]);
+        assert!((kept.lines[2] - expected[2]).norm() < 1e-12);
+        let part = inside(2.0, [0.5, 1.6]);
+        assert!(part > 0.0 && part < 1.0);
+        assert!((kept.lines[4] - 0.9 * part).norm() < 1e-12);
+        let nothing = Inverse::of(&response, [5.0, 6.0], 0.5);
+        assert_eq!(nothing.coherence(), 0.0);
+        assert!(nothing.corrected_band().iter().all(|bound| bound.is_nan()));
+    }
+
+    #[test]
+    fn a_correction_of_a_drive_makes_up_for_a_smaller_table() {
+        let dt = 0.01;
+        let half = Response {
+            step: 0.25,
+            gain: vec![Complex64::new(0.5, 0.0); 201],
+            coherence: vec![1.0; 201],
+        };
+        let inverse = Inverse::of(&half, [0.0, 50.0], 0.5);
+        // A pulse without a mean: 0 Hz is not corrected.
+        let (_, error) = pulse(600, dt);
+        let own = inverse.correction(&error, dt);
+        let twice: Vec<f64> = error.iter().map(|value| 2.0 * value).collect();
+        let peak = error.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
+        assert!(largest(&own, &twice) < 1e-3 * peak);
+        assert_eq!((own[0], own[599]), (0.0, 0.0));
+    }
 }

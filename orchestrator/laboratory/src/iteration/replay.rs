@@ -585,6 +585,122 @@ mod tests {
         std::fs::write(path, text).unwrap();
     }
 
+    /// A pulse about `middle`, whose spectrum ends far below half of the sampling rate.
+    fn pulse(middle: f64, samples: usize) -> Vec<f64> {
+        let at = |k: usize| (-((k as f64 - middle) / 6.0).powi(2)).exp();
+        (0..samples).map(at).collect()
+    }
+
+    #[test]
+    fn a_delay_is_found_and_made_to_a_part_of_a_sample() {
+        for by in [0.0, 3.0, 7.25, -4.5, 20.75] {
+            let (signal, later) = (pulse(60.0, 160), pulse(60.0 + by, 160));
+            let found = lag(&signal, &later);
+            assert!((found - by).abs() < 0.02, "{found} of {by}");
+            let moved = delayed(&signal, by, 160, DT);
+            assert_eq!(moved.len(), 160);
+            let off = moved.iter().zip(&later).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-9, "{by}");
+        }
+        // Only so many samples, of a signal that is shorter or longer.
+        assert_eq!(delayed(&pulse(20.0, 50), 1.0, 30, DT).len(), 30);
+        let longer = delayed(&pulse(20.0, 50), 1.0, 80, DT);
+        assert!(longer.len() == 80 && longer[70].abs() < 1e-9);
+        // Not farther than a quarter of the shorter signal.
+        assert!(lag(&pulse(20.0, 160), &pulse(140.0, 160)).abs() <= 40.5);
+    }
+
+    #[test]
+    fn samples_are_centred_and_gaps_keep_the_last_value() {
+        let values = [f64::NAN, 1.0, 3.0, f64::NAN, 5.0];
+        assert_eq!(centred(&values), [0.0, -2.0, 0.0, 0.0, 2.0]);
+        assert_eq!(centred(&[f64::NAN; 2]), [0.0, 0.0]);
+        assert_eq!(less(&[3.0, 1.0], &[1.0, 5.0]), [2.0, -4.0]);
+        assert_eq!(sum(&[3.0, 1.0], &[1.0, 5.0]), [4.0, 6.0]);
+    }
+
+    /// Of a parabola central differences are exact, one-sided ones are half a sample beside.
+    #[test]
+    fn a_motion_has_the_rates_of_its_displacement() {
+        let dt = 0.5;
+        let displacement: Vec<f64> = (0..5).map(|k| (f64::from(k) * dt).powi(2)).collect();
+        let own = motion_of("own", dt, displacement.clone());
+        assert_eq!((own.dt, &own.displacement), (dt, &displacement));
+        assert_eq!(own.velocity, [0.5, 1.0, 2.0, 3.0, 3.5]);
+        assert_eq!(own.acceleration, [1.0, 1.5, 2.0, 1.5, 1.0]);
+        assert_eq!(motion_of("point", dt, vec![1.0]).velocity, [0.0]);
+    }
+
+    #[test]
+    fn a_rail_is_the_largest_value_three_times_in_a_row() {
+        assert_eq!(rail(&[0.0, 1.0, 2.0, 2.0, 2.0, 1.0]), Some(2.0));
+        assert_eq!(rail(&[-3.0, 3.0, -3.0, 0.0]), Some(3.0));
+        assert_eq!(rail(&[2.0, 2.0, 1.0, 2.0, 2.0]), None);
+        assert_eq!(rail(&[2.0, 2.0, 1.999, 2.0]), None);
+        assert_eq!(rail(&[]), None);
+    }
+
+    #[test]
+    fn what_cannot_be_replayed_is_refused_with_its_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, dt: f64, rows: &str| {
+            let path = folder.path().join(name);
+            let rows = rows.split(';').enumerate();
+            let rows = rows.map(|(k, row)| format!("{},{row}\n", k as f64 * dt));
+            let text = format!("time [s],reference [mm],displacement [mm]\n{}", {
+                rows.collect::<String>()
+            });
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let told = |rounds: &[&PathBuf], scale: Option<f64>| {
+            let plan = Plan {
+                rig: None,
+                rounds: rounds.iter().map(|path| (*path).clone()).collect(),
+                columns: Vec::new(),
+                wanted: None,
+                scale,
+                band: [0.1, 30.0],
+                gain: 0.9,
+                limit: None,
+            };
+            let told = replay(&plan).unwrap_err().to_string();
+            told.replace(&format!("{}/", folder.path().display()), "")
+        };
+        let short = file("short.csv", 0.01, "0,0;1,1;2,1;0,0");
+        let slow = file("slow.csv", 0.02, "0,0;1,1;2,1;0,0");
+        let still = file("still.csv", 0.01, "0,5;1,5;2,5;0,5");
+        for (rounds, scale, expected) in [
+            (
+                &[][..],
+                None,
+                "--replay: no file; expected the recorded rounds in their order",
+            ),
+            (
+                &[&short, &slow],
+                None,
+                "slow.csv: sampled at 50.0000 Hz; expected 100.0000 Hz as short.csv",
+            ),
+            (
+                &[&still],
+                None,
+                "still.csv: drive or displacement does not move",
+            ),
+            (
+                &[&short],
+                None,
+                "short.csv: too short for a transfer function; expected 6 s or more",
+            ),
+            (
+                &[&short],
+                Some(0.0),
+                "--scale: 0: expected a factor of the wanted motion other than 0",
+            ),
+        ] {
+            assert_eq!(told(rounds, scale), expected);
+        }
+    }
+
     #[test]
     fn rounds_give_the_next_drive_and_the_error_that_it_then_has() {
         let folder = std::env::temp_dir().join(format!("replay-{}", std::process::id()));

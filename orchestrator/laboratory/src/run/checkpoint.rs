@@ -55,6 +55,22 @@ struct Block {
     exact: Vec<Datum>,
 }
 
+/// Why a checkpoint is not kept.
+#[derive(Debug, thiserror::Error)]
+pub enum KeepError {
+    /// A moment that has no binary form.
+    #[error(transparent)]
+    Encoding(#[from] postcard::Error),
+    /// The files cannot be written, such as on a disk that is full.
+    #[error("{}: {source}", folder.display())]
+    Write {
+        /// The folder of the checkpoints.
+        folder: PathBuf,
+        /// The operating system's word.
+        source: io::Error,
+    },
+}
+
 /// A run that can go on.
 #[derive(Debug)]
 pub struct Unfinished {
@@ -244,13 +260,13 @@ impl Checkpoints {
     ///
     /// # Errors
     /// A disk that is full, and the like.
-    pub fn keep(&mut self, checkpoint: &Checkpoint, record: &Record) -> Result<(), String> {
+    pub fn keep(&mut self, checkpoint: &Checkpoint, record: &Record) -> Result<(), KeepError> {
         let (values, exact) = record.rows_from(self.kept);
         let block = Block {
             values: values.to_vec(),
             exact: exact.to_vec(),
         };
-        let bytes = postcard::to_allocvec(&block).map_err(|error| error.to_string())?;
+        let bytes = postcard::to_allocvec(&block)?;
         let sum = self.sum.clone().chain_update(&bytes);
         let length = self.length + bytes.len() as u64;
         let saved = Saved {
@@ -263,7 +279,7 @@ impl Checkpoints {
             every: self.every,
             checkpoint: checkpoint.clone(),
         };
-        let content = postcard::to_allocvec(&saved).map_err(|error| error.to_string())?;
+        let content = postcard::to_allocvec(&saved)?;
         let mut state = MAGIC.to_vec();
         state.extend(Sha256::digest(&content).as_slice());
         state.extend(content);
@@ -273,7 +289,11 @@ impl Checkpoints {
             self.rows.sync_data()?;
             replace(&self.folder, STATE, &state)
         };
-        written().map_err(|error| format!("{}: {error}", self.folder.display()))?;
+        let written = written();
+        written.map_err(|source| KeepError::Write {
+            folder: self.folder.clone(),
+            source,
+        })?;
         (self.length, self.sum, self.kept) = (length, sum, record.len());
         Ok(())
     }

@@ -509,3 +509,100 @@ pub fn is_file(system: &str) -> bool {
 fn is_fmu(system: &str) -> bool {
     system.to_lowercase().ends_with(".fmu")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_fmu_alone_has_rows_at_round_times_some_thousand_of_them() {
+        for (duration, step) in [
+            (1.0, 0.002),
+            (10.0, 0.002),
+            (25.0, 0.005),
+            (49.0, 0.005),
+            (50.0, 0.01),
+            (100.0, 0.02),
+            (260.0, 0.05),
+            (3600.0, 0.5),
+            (86_400.0, 10.0),
+            (f64::INFINITY, 0.002),
+            (f64::NAN, 0.002),
+        ] {
+            let found = step_alone(duration);
+            assert!(
+                (found / step - 1.0).abs() < 1e-9,
+                "{duration} s: {found}, expected {step}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_system_with_a_suffix_or_a_folder_is_a_file() {
+        for name in ["own.toml", "Own.FMU", "a.ssp", "folder/own", "folder\\own"] {
+            assert!(is_file(name), "{name}");
+        }
+        for name in ["mpc", "three-variable", "toml", "fmu"] {
+            assert!(!is_file(name), "{name}");
+        }
+        assert!(is_fmu("a.fmu") && is_fmu("A.FMU") && !is_fmu("fmu") && !is_fmu("a.fmu.toml"));
+    }
+
+    #[test]
+    fn an_order_of_calls_is_that_of_the_request_then_of_the_system() {
+        let mut file = SystemFile::new("own");
+        let mut request = Request::built_in("mpc");
+        assert_eq!(algorithm(&request, &file).unwrap(), Algorithm::default());
+        file.experiment.algorithm = Some("jacobi".to_string());
+        assert_eq!(algorithm(&request, &file).unwrap(), Algorithm::Jacobi);
+        request.algorithm = Some(Algorithm::GaussSeidel);
+        assert_eq!(algorithm(&request, &file).unwrap(), Algorithm::GaussSeidel);
+        request.algorithm = None;
+        file.experiment.algorithm = Some("sideways".to_string());
+        let told = algorithm(&request, &file).unwrap_err().to_string();
+        assert!(
+            told.contains("experiment.algorithm") && told.contains("`sideways` is none of "),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn a_step_varies_where_an_error_is_stated_and_a_least_step_needs_one() {
+        let file = SystemFile::new("own");
+        let request = |percent: Option<f64>, least: Option<f64>| Request {
+            variable_step_percent: percent,
+            least_step_s: least,
+            ..Request::built_in("mpc")
+        };
+        let found = |own: &Request| variable_step(own, &file).map_err(|error| error.to_string());
+        assert!(found(&request(None, None)).unwrap().is_none());
+        let own = found(&request(Some(0.5), Some(1e-5))).unwrap().unwrap();
+        assert_eq!((own.tolerance, own.least), (0.005, Some(1e-5)));
+        let told = found(&request(None, Some(1e-5))).err().unwrap();
+        assert!(told.starts_with("--least-step: "), "{told}");
+    }
+
+    #[test]
+    fn a_motion_rests_at_its_last_displacement() {
+        let axis = |first: f64| Motion {
+            displacement: vec![first, first + 1.0],
+            velocity: vec![3.0, 4.0],
+            acceleration: vec![5.0, 6.0],
+            ..no_motion()
+        };
+        let mut both = axis(1.0);
+        both.across = Some(Box::new(axis(10.0)));
+        let found = samples(&both);
+        assert_eq!(found.period, USUAL_STEP);
+        let after: Vec<f64> = found.columns.iter().map(|own| own.after).collect();
+        assert_eq!(after, [2.0, 0.0, 0.0, 11.0, 0.0, 0.0]);
+        assert_eq!(found.columns[3].values, [10.0, 11.0]);
+        assert_eq!(samples(&axis(1.0)).columns.len(), 3);
+        let none = samples(&no_motion());
+        assert!(
+            none.columns
+                .iter()
+                .all(|own| own.after == 0.0 && own.values.is_empty())
+        );
+    }
+}

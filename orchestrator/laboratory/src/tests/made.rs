@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use fmi_import::{Behaviour, FmiVersion, Fmu, Options};
+use fmi_import::{Behaviour, BehaviourError, FmiVersion, Fmu, Options};
 use fmi_master::{Algorithm, Ending, Record};
 use fmi_system::{Component, Link, System, SystemFile, assemble};
 use identification::diagnosis::rigs::RigDiagnosis;
@@ -182,16 +182,22 @@ pub fn followed(motion: &Motion, part: f64) -> Record {
 struct Computed(fn(&[f64], &mut [f64]));
 
 impl Behaviour for Computed {
-    fn step(&mut self, _: f64, _: f64, inputs: &[f64], outputs: &mut [f64]) -> Result<(), String> {
+    fn step(
+        &mut self,
+        _: f64,
+        _: f64,
+        inputs: &[f64],
+        outputs: &mut [f64],
+    ) -> Result<(), BehaviourError> {
         (self.0)(inputs, outputs);
         Ok(())
     }
 
-    fn save(&mut self) -> Result<Vec<u8>, String> {
+    fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
         Ok(Vec::new())
     }
 
-    fn restore(&mut self, _: &[u8]) -> Result<(), String> {
+    fn restore(&mut self, _: &[u8]) -> Result<(), BehaviourError> {
         Ok(())
     }
 }

@@ -210,9 +210,7 @@ impl Search<'_> {
         // One evaluation gives objective and margins.
         let evaluate = |at: &[f64]| -> Option<Trial> {
             let values = self.values(at);
-            let is_near = |a: &f64, b: &f64| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
-            let is_known =
-                |own: &&Trial| own.values.iter().zip(&values).all(|(a, b)| is_near(a, b));
+            let is_known = |own: &&Trial| are_same(&own.values, &values);
             let known = trials.borrow().iter().find(is_known).cloned();
             if known.is_some() {
                 return known;
@@ -391,6 +389,12 @@ impl Parameter {
     }
 }
 
+/// Whether two sets of values are one but for the rounding of coordinates and back.
+fn are_same(one: &[f64], other: &[f64]) -> bool {
+    let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * a.abs().max(b.abs());
+    one.iter().zip(other).all(is_near)
+}
+
 /// By how much a margin is kept.
 fn margin(trial: Option<Trial>, own: impl Fn(&Held) -> Option<f64>, asked: f64) -> f64 {
     /// A loop that is not crossed has this much to spare; an unstable one lacks it.
@@ -492,6 +496,35 @@ mod tests {
             assert_eq!(own.value(1.5), own.value(1.0));
             assert_eq!(own.place(2.0 * high), 1.0);
         }
+    }
+
+    #[test]
+    fn values_are_known_through_coordinates_and_back_and_others_are_not() {
+        for (low, high) in [(0.1, 10.0), (-3.0, 5.0), (2e5, 9e5)] {
+            let own = Parameter {
+                name: "control.gain".to_string(),
+                unit: String::new(),
+                low,
+                high,
+                before: low,
+                after: low,
+            };
+            for place in 0..=20 {
+                let value = own.value(f64::from(place) / 20.0);
+                let back = own.value(own.place(value));
+                assert!(are_same(&[value, 1.0], &[back, 1.0]), "{value} {back}");
+            }
+        }
+        // Each value counts, whichever sign it has and whichever is the larger.
+        for other in [1.0 + 2e-9, 1.0 - 2e-9, -1.0, 0.0] {
+            assert!(!are_same(&[1.0], &[other]), "{other}");
+            assert!(!are_same(&[other], &[1.0]), "{other}");
+            assert!(!are_same(&[2.0, 1.0], &[2.0, other]), "{other}");
+        }
+        assert!(!are_same(&[-3.0], &[3.0]) && are_same(&[-3.0], &[-3.0]));
+        assert!(are_same(&[0.0], &[0.0]));
+        // Relative to the values: 1e-3 of 1e7 is as good as nothing, 1e-12 of 1e-6 is not.
+        assert!(are_same(&[1e7], &[1e7 + 1e-3]) && !are_same(&[1e-6], &[1e-6 + 1e-12]));
     }
 
     fn study(factors: &str) -> Study {

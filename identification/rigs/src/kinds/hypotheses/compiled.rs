@@ -103,7 +103,7 @@ fn channels(rig: &dyn Rig) -> Vec<Channel> {
 }
 
 /// The place called `at`, or the names of those that there are.
-fn place(at: &str, rig: &dyn Rig) -> Result<Place, String> {
+fn place(at: &str, rig: &dyn Rig) -> Result<Place, Wrong> {
     let inputs = rig.inputs();
     let is_device = rig.output().unit() == "N" && inputs.contains(&Channel::Displacement);
     let mut all: Vec<(&str, Place)> = Vec::new();
@@ -126,16 +126,18 @@ fn place(at: &str, rig: &dyn Rig) -> Result<Place, String> {
         all.push((channel.name(), Place::Input(*channel)));
     }
     let found = all.iter().find(|(name, _)| *name == at);
-    found.map(|(_, place)| *place).ok_or_else(|| {
-        let mut names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
-        // An oscillator has an input and a place of one name.
-        names.dedup();
-        format!(
-            "`{at}` is not a place of the kind {}: expected {}",
-            rig.kind(),
-            listed(&names)
-        )
-    })
+    if let Some((_, place)) = found {
+        return Ok(*place);
+    }
+    let mut names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+    // An oscillator has an input and a place of one name.
+    names.dedup();
+    let what = format!(
+        "`{at}` is not a place of the kind {}: expected {}",
+        rig.kind(),
+        listed(&names)
+    );
+    wrong("at", at, what)
 }
 
 impl Compiled {
@@ -159,7 +161,7 @@ impl Compiled {
                 "is empty: expected what the effect is, for the report",
             );
         }
-        let place = place(&own.at, rig).or_else(|what| wrong("at", &own.at, what))?;
+        let place = place(&own.at, rig)?;
         let channels = channels(rig);
         let mut names: Vec<String> = SIGNALS.map(String::from).to_vec();
         names.extend(own.parameters.keys().cloned());
@@ -181,7 +183,7 @@ impl Compiled {
             let read = Expression::parse(text, &names);
             let read =
                 read.or_else(|error: ExpressionError| wrong(key, text, error.to_string()))?;
-            usable(&read, place, &names, own).or_else(|what| wrong(key, text, what))?;
+            usable(&read, place, &names, own, (key, text))?;
             Ok(read)
         };
         let value = expression("value", &own.value)?;
@@ -351,13 +353,14 @@ impl Compiled {
     }
 }
 
-/// Whether the names that an expression reads have a value at `place`.
+/// Whether the names that an expression reads have a value at `place`; `key` and `text` are what it was read from.
 fn usable(
     expression: &Expression,
     place: Place,
     names: &[String],
     own: &Hypothesis,
-) -> Result<(), String> {
+    (key, text): (&str, &str),
+) -> Result<(), Wrong> {
     let (none, instead): (&[usize], &str) = match place {
         Place::Input(_) | Place::Output => {
             (&[POSITION, SPEED], "`u` is the signal and `du` its rate")
@@ -372,10 +375,11 @@ fn usable(
         ),
     };
     if let Some(slot) = none.iter().find(|slot| expression.reads(**slot)) {
-        return Err(format!(
+        let what = format!(
             "`{}` has no value at `{}`: {instead}",
             SIGNALS[*slot], own.at
-        ));
+        );
+        return wrong(key, text, what);
     }
     let Some(delayed) = expression.delays() else {
         return Ok(());
@@ -389,10 +393,11 @@ fn usable(
         Place::Input(_) | Place::Output => "`u` or a channel",
         _ => "a channel",
     };
-    Err(format!(
+    let what = format!(
         "the past of `{}` is not kept: expected {expected}",
         names[delayed]
-    ))
+    );
+    wrong(key, text, what)
 }
 
 fn remembered(

@@ -329,3 +329,6 @@ fn report_tick(sink: &dyn Sink, clock: &str, time: f64) {
     );
     sink.message(1, "", &text);
 }
+
+#[cfg(test)]
+mod tests;

@@ -132,3 +132,50 @@ const D: [f64; 7] = [
     -1453857185.0 / 822651844.0,
     69997945.0 / 29380423.0,
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `x' = -2 x + t`, `y' = x - y` from 1 and 0, whose solution has a closed form.
+    fn slope(t: f64, [x, y]: [f64; 2]) -> [f64; 2] {
+        [-2.0 * x + t, x - y]
+    }
+
+    fn solution(t: f64) -> [f64; 2] {
+        let x = 1.25 * (-2.0 * t).exp() + 0.5 * t - 0.25;
+        // y' + y = x, with y(0) = 0.
+        let y = -1.25 * (-2.0 * t).exp() + 0.5 * t - 0.75 + 2.0 * (-t).exp();
+        [x, y]
+    }
+
+    #[test]
+    fn the_continuous_output_is_the_solution_within_a_step_to_the_fourth_order() {
+        let error = |size: f64| {
+            let state = [1.0, 0.0];
+            let mut slopes: [Vec<f64>; 7] = std::array::from_fn(|_| vec![0.0; 2]);
+            for stage in 0..7 {
+                let at = [0, 1].map(|i| {
+                    let sum: f64 = (0..stage.min(6)).map(|j| A[stage][j] * slopes[j][i]).sum();
+                    state[i] + size * sum
+                });
+                slopes[stage] = slope(C[stage] * size, at).to_vec();
+            }
+            let slopes = Slopes(slopes);
+            let mut most = 0.0_f64;
+            for k in 0..=20 {
+                let theta = f64::from(k) / 20.0;
+                let found = slopes.between(&state, size, theta);
+                for (own, truth) in found.iter().zip(solution(theta * size)) {
+                    most = most.max((own - truth).abs());
+                }
+            }
+            most
+        };
+        let [whole, half] = [0.2, 0.1].map(error);
+        assert!(whole < 1e-5, "{whole:e}");
+        // An error of order five within the step: a half of it has a thirty-second.
+        let ratio = whole / half;
+        assert!((20.0..50.0).contains(&ratio), "{ratio}");
+    }
+}

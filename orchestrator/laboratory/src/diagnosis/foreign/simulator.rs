@@ -53,8 +53,28 @@ fn signal(variable: &Variable) -> Signal {
     }
 }
 
+/// A name of a map that is not that of a real variable.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum NotReal {
+    /// No variable of that kind.
+    #[error("{model} has no {what} `{name}`{hint}")]
+    Unknown {
+        model: String,
+        what: &'static str,
+        name: String,
+        hint: String,
+    },
+    /// A variable of another type.
+    #[error("the {what} `{name}` is of the type {kind}: expected Float64 or Float32")]
+    Type {
+        what: &'static str,
+        name: String,
+        kind: &'static str,
+    },
+}
+
 /// A variable that holds a real number.
-fn real<'a>(fmu: &'a Fmu, name: &str, causality: Causality) -> Result<&'a Variable, String> {
+fn real<'a>(fmu: &'a Fmu, name: &str, causality: Causality) -> Result<&'a Variable, NotReal> {
     let description = &fmu.description;
     let of = description.of(causality).map(|i| &description.variables[i]);
     let what = match causality {
@@ -71,18 +91,20 @@ fn real<'a>(fmu: &'a Fmu, name: &str, causality: Causality) -> Result<&'a Variab
         });
     let found = found.ok_or_else(|| {
         let known = of.map(|variable| variable.name.as_str());
-        format!(
-            "{} has no {what} `{name}`{}",
-            description.model_name,
-            hint(name, known)
-        )
+        NotReal::Unknown {
+            model: description.model_name.clone(),
+            what,
+            name: name.to_owned(),
+            hint: hint(name, known),
+        }
     })?;
     match found.kind {
         Kind::Float64 | Kind::Float32 => Ok(found),
-        _ => Err(format!(
-            "the {what} `{name}` is of the type {}: expected Float64 or Float32",
-            found.kind.name()
-        )),
+        _ => Err(NotReal::Type {
+            what,
+            name: name.to_owned(),
+            kind: found.kind.name(),
+        }),
     }
 }
 
@@ -127,7 +149,7 @@ pub(super) fn mapped(
             let variable = real(&fmu, name, causality);
             variable
                 .map(signal)
-                .map_err(|reason| wrong(format!("{table}.{name}"), reason))
+                .map_err(|error| wrong(format!("{table}.{name}"), error.to_string()))
         });
         own.collect::<Result<Vec<Signal>, Error>>()
     };
@@ -138,7 +160,7 @@ pub(super) fn mapped(
         own.parameters.clone_from(&map.start);
         for (name, stated) in &map.parameters {
             real(&fmu, name, Causality::Parameter)
-                .map_err(|reason| wrong(format!("parameters.{name}"), reason))?;
+                .map_err(|error| wrong(format!("parameters.{name}"), error.to_string()))?;
             if let Some(value) = &stated.value {
                 own.parameters.insert(name.clone(), value.clone());
             }
@@ -161,7 +183,8 @@ pub(super) fn mapped(
             let at = part.fmu.description.position(name).unwrap_or(0);
             let variable = &part.fmu.description.variables[at];
             let value = part.start_value(&given, at).number();
-            check(value, stated).map_err(|reason| wrong(format!("parameters.{name}"), reason))?;
+            check(value, stated)
+                .map_err(|error| wrong(format!("parameters.{name}"), error.to_string()))?;
             let parameter = Parameter {
                 name: name.clone(),
                 unit: variable.unit.clone().unwrap_or_default(),
@@ -206,17 +229,23 @@ fn table(inputs: &[Signal]) -> Option<InputTable> {
     })
 }
 
-fn check(value: f64, stated: &Stated) -> Result<(), String> {
+/// A drift that a map does not define.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum NoDrift {
+    /// A deviation that is negative or not a number.
+    #[error("`plus_minus` is {0}: expected a number, not negative")]
+    PlusMinus(f64),
+    /// Neither a value nor a deviation to compare with.
+    #[error("it starts at 0, so a relative drift has no scale: expected `plus_minus`")]
+    Scale,
+}
+
+fn check(value: f64, stated: &Stated) -> Result<(), NoDrift> {
     if !(stated.plus_minus.is_finite() && stated.plus_minus >= 0.0) {
-        return Err(format!(
-            "`plus_minus` is {}: expected a number, not negative",
-            stated.plus_minus
-        ));
+        return Err(NoDrift::PlusMinus(stated.plus_minus));
     }
     if value == 0.0 && stated.plus_minus == 0.0 {
-        return Err(
-            "it starts at 0, so a relative drift has no scale: expected `plus_minus`".to_owned(),
-        );
+        return Err(NoDrift::Scale);
     }
     Ok(())
 }
@@ -329,9 +358,9 @@ mod tests {
         };
         assert_eq!(check(2.0, &stated(0.0)), Ok(()));
         assert_eq!(check(0.0, &stated(0.5)), Ok(()));
-        assert!(check(0.0, &stated(0.0)).unwrap_err().contains("no scale"));
+        assert_eq!(check(0.0, &stated(0.0)), Err(NoDrift::Scale));
         for wrong in [-0.5, f64::NAN, f64::INFINITY] {
-            let told = check(2.0, &stated(wrong)).unwrap_err();
+            let told = check(2.0, &stated(wrong)).unwrap_err().to_string();
             assert!(told.contains("expected a number, not negative"), "{told}");
         }
     }
@@ -411,18 +440,19 @@ mod tests {
             + r#"<Boolean name="on" valueReference="4" causality="input" start="true"/>"#;
         let fmu = made::fmu("Own", &variables);
         let found = |name: &str, causality| real(&fmu, name, causality).map(|own| own.name.clone());
-        assert_eq!(found("u", Causality::Input).as_deref(), Ok("u"));
-        assert_eq!(found("y", Causality::Output).as_deref(), Ok("y"));
-        assert_eq!(found("p", Causality::Parameter).as_deref(), Ok("p"));
-        let told = found("v", Causality::Input).unwrap_err();
+        assert_eq!(found("u", Causality::Input).unwrap(), "u");
+        assert_eq!(found("y", Causality::Output).unwrap(), "y");
+        assert_eq!(found("p", Causality::Parameter).unwrap(), "p");
+        let told = found("v", Causality::Input).unwrap_err().to_string();
         assert!(told.starts_with("Own has no input `v`"), "{told}");
         assert!(
             found("u", Causality::Output)
                 .unwrap_err()
+                .to_string()
                 .starts_with("Own has no output `u`")
         );
         assert!(found("u", Causality::Parameter).is_err());
-        let told = found("on", Causality::Input).unwrap_err();
+        let told = found("on", Causality::Input).unwrap_err().to_string();
         assert!(
             told.contains("is of the type Boolean: expected Float64 or Float32"),
             "{told}"
