@@ -149,17 +149,6 @@ pub fn refit<M: SimulatedModel>(
     Some((found.into(), deviations))
 }
 
-/// As [`refit`], also along a valley.
-pub fn refit_along<M: SimulatedModel>(
-    model: &M,
-    start: &Point,
-    record: usize,
-) -> Option<(Simulated, Vec<f64>)> {
-    let found = polished(model, start, record, TO_THE_END)?;
-    let deviations = deviations(model, &found, record).unwrap_or_default();
-    Some((found.into(), deviations))
-}
-
 /// The nominal model, from the stated values and from others around them.
 pub fn nominal<M: SimulatedModel>(model: &M, record: usize) -> Option<Simulated> {
     let stated = Point {

@@ -636,6 +636,27 @@ mod tests {
         assert!(errors[0] < 0.5 && off.abs() < 3.5, "{off} {errors:?}");
     }
 
+    /// Where two steps end, the cost still falls; with differences to both sides it ends where it is flat.
+    #[test]
+    fn a_fit_that_ends_early_is_followed_to_where_the_cost_is_flat() {
+        let model = Decay::new([1.5, 1.2, 0.0, 0.1, -0.1], 0.01);
+        let early = least_squares(&model, &origin(), 0, &Free::All, 2).unwrap();
+        let found = polished(&model, &origin(), 0, 2).unwrap();
+        let steepest = |at: &Solution| {
+            let slopes = (0..4).map(|i| {
+                let cost = |by: f64| {
+                    let mut moved = at.point.clone();
+                    moved.nuisance[i] += by;
+                    solution(&model, &moved, 0).unwrap().cost
+                };
+                ((cost(1e-4) - cost(-1e-4)) / 2e-4).abs()
+            });
+            slopes.fold(0.0, f64::max)
+        };
+        assert!(steepest(&early) > 1.0, "{}", steepest(&early));
+        assert!(steepest(&found) < 0.01, "{}", steepest(&found));
+    }
+
     /// Against the cost itself: it is twice the negative log likelihood where the variance is that of the errors.
     #[test]
     fn the_normal_equations_are_the_slope_and_the_curvature_of_the_cost() {

@@ -15,8 +15,8 @@ mod verdict;
 
 pub use adequacy::{Part, Place, Test};
 pub use cross_validation::{
-    AGAIN, Rival, Selected, Simulated, VITAL, as_stated, completed, looked, nominal, refit,
-    refit_along, select, select_jointly, settled, settled_along,
+    AGAIN, Rival, Selected, Simulated, VITAL, as_stated, completed, looked, nominal, refit, select,
+    select_jointly, settled, settled_along,
 };
 pub use fit::{Fit, Jacobian, evaluate, residuals};
 pub use least_squares::WEAK;

@@ -134,8 +134,8 @@ fn long_records_are_reduced_further_and_the_rate_they_were_recorded_at_is_kept()
         assert!((one.recorded_period - 0.004).abs() < 1e-9);
         one.period()
     };
-    assert!((period(29_000) - 0.004).abs() < 1e-9);
-    assert!((period(31_000) - 0.008).abs() < 1e-9);
+    assert!((period(19_000) - 0.004).abs() < 1e-9);
+    assert!((period(21_000) - 0.008).abs() < 1e-9);
 }
 
 #[test]

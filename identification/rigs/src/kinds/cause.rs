@@ -49,9 +49,14 @@ impl Cause {
         // Standard deviation of the shares, and of the delays in s, by which what is off is off.
         const SHARE: f64 = 0.1;
         const LATE: f64 = 0.01;
-        let usual = if self.found.unit == "s" { LATE } else { SHARE };
         let error = self.found.standard_error;
-        let off = self.found.value - self.stated;
+        let off = (self.found.value - self.stated).abs();
+        // Of a delay the interval is what data leave open, all of it alike.
+        let (usual, off) = if self.found.unit == "s" {
+            (LATE, (off - INTERVAL_95 * error).max(0.0))
+        } else {
+            (SHARE, off)
+        };
         let density = |deviation: f64| (-0.5 * (off / deviation).powi(2)).exp() / deviation;
         let [chance, fault] = [density(error), density(error.hypot(usual))];
         fault / (fault + chance)
@@ -293,6 +298,22 @@ mod tests {
             unit: unit.into(),
             standard_error,
         }
+    }
+
+    #[test]
+    fn a_delay_that_may_be_none_weighs_less_than_none_the_less_the_narrower() {
+        let weight = |value: f64, error: f64| {
+            let found = found("command_delay", value, error, "s");
+            Cause { found, stated: 0.0 }.weight()
+        };
+        // All of 0 to 4 ms and of 0 to 40 ms, whatever the middle.
+        let [narrow, wide] = [4e-3, 4e-2].map(|far| weight(0.5 * far, 0.5 * far / INTERVAL_95));
+        assert!(
+            (narrow - 1.02e-3 / (1.02e-3 + 10.05e-3)).abs() < 1e-3,
+            "{narrow}"
+        );
+        assert!(narrow < wide && wide < 0.5, "{narrow} {wide}");
+        assert!(weight(4e-3, 0.5e-3) > 0.9);
     }
 
     #[test]

@@ -37,6 +37,7 @@ const FINE: f64 = 0.25;
 const MOST_STEPS: f64 = 16.0;
 /// The fewest: between samples the command follows a curve, and friction is even over a step.
 const SMOOTH: f64 = 2.0;
+/// The fewest at a rail, where what is fed back runs straight over a step, at most.
 const RAILED: f64 = 4.0;
 /// Share of the damping that the controller feeds back, where a search begins, and the most.
 const FED_BACK: f64 = 0.02;
@@ -364,8 +365,7 @@ impl Equations for ClosedLoopActuator {
             SMOOTH
         } else {
             let most = gain * (1.0 + asymmetry.abs());
-            // What is fed back at a rail runs straight over a step.
-            let smooth = if slowness > 0.0 {
+            let smooth = if slowness > 0.0 && resonance > 0.0 {
                 (sample / resonance).ceil().clamp(SMOOTH, RAILED)
             } else {
                 SMOOTH

@@ -13,7 +13,7 @@ use crate::report::ends_or_not_a_number;
 use diagnosis::resampling::{correlation_time, gain_interval};
 use diagnosis::{
     AGAIN, Candidate, Free, Point, Role, VITAL, all_errors, completed, estimates, least_squares,
-    looked, refit, refit_along, settled, squares,
+    looked, refit, settled, squares,
 };
 use recordings::mean_and_deviation;
 
@@ -365,7 +365,7 @@ struct Fits {
 
 fn fits<M: InParts>(measured: &M, start: &Point) -> Option<Fits> {
     // What one part hardly shows stays where all data have it.
-    let everything = refit_along(measured, start, EVERYTHING)?;
+    let everything = refit(measured, start, EVERYTHING)?;
     let (first, second) = rayon::join(
         || refit(measured, &everything.0.point, Part::Fitted as usize),
         || refit(measured, &everything.0.point, Part::LeftOut as usize),

@@ -531,25 +531,29 @@ fn beyond<M: InParts>(
     parameters: &[NamedValue],
 ) -> Option<Cause> {
     [1.0, -1.0].into_iter().find_map(|side| {
-        let off = stated + side * FROM * within - found.value;
-        if off.abs() > HOPELESS * found.standard_error {
+        let threshold = stated + side * FROM * within;
+        let off = (threshold - found.value).abs();
+        // Nor is a model to be believed that is as far off on the other side.
+        if off > HOPELESS * found.standard_error || off > 2.0 * FROM * within {
             return None;
         }
         let mut cause = Cause {
             found: NamedValue {
-                value: stated + side * FROM * within,
+                value: threshold,
                 ..found.clone()
             },
             stated,
         };
-        if cause.makes_up(parameters) || !profiled.may_be(i, cause.found.value) {
+        if cause.makes_up(parameters) || !profiled.may_be(i, threshold) {
             return None;
         }
-        let far = profiled.far_end(i, cause.found.value)?;
-        let near = if profiled.may_be(i, stated) {
+        let far = profiled.far_end(i, threshold)?;
+        // As far to the near side, if not as stated.
+        let best = profiled.value(i)?;
+        let near = if profiled.may_be(i, stated) || (best - stated) * side < (far - best) * side {
             stated
         } else {
-            found.value
+            2.0 * best - far
         };
         let (low, high) = (near.min(far), near.max(far));
         cause.found.value = 0.5 * (low + high);

@@ -8,7 +8,7 @@ use super::readings::FAR;
 use diagnosis::{Point, all_errors, looked, settled, settled_along, squares};
 
 /// Growth of the squared error that tells nothing: no model is exact; and as a share of what is not white noise.
-const INEXACT: f64 = 0.03;
+const INEXACT: f64 = 0.01;
 const COLOURED: f64 = 0.2;
 /// Values that are tried to either side.
 const TRIES: usize = 4;
@@ -287,6 +287,10 @@ mod tests {
                     assert!(high - low < 0.012, "{low} {high}");
                 }
             }
+            let mut own = beside(&measured, &point).unwrap();
+            assert!(own.may_be(i, delay) && !own.may_be(i, delay + 0.02));
+            let far = own.far_end(i, delay + 0.02).unwrap();
+            assert!(far > delay && far < delay + 0.02, "{far}");
         }
     }
 }

@@ -32,7 +32,7 @@ pub const SLOWEST: f64 = 8.0;
 
 /// Sampling rate that is enough for a table's motion, Hz, and that for long records of more samples than these.
 const ENOUGH: f64 = 200.0;
-const LONG: usize = 30_000;
+const LONG: usize = 20_000;
 const ENOUGH_OF_LONG: f64 = 100.0;
 
 /// A kind, what it is, and its channels with the roles of their columns.
