@@ -41,7 +41,7 @@ const SMOOTH: f64 = 2.0;
 const RAILED: f64 = 4.0;
 /// Share of the damping that the controller feeds back, where a search begins, and the most.
 const FED_BACK: f64 = 0.02;
-const MOST_FED_BACK: f64 = 0.9;
+const MOST_FED_BACK: f64 = 0.5;
 /// Integral below which it does not make up for a spring, 1/s: gain and scale are then those of a table that the
 /// spring holds back.
 const SLOW: f64 = 0.1;
