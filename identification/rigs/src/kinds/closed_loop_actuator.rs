@@ -465,6 +465,13 @@ mod tests {
         }
     }
 
+    /// Root of the squared error over the square of what was measured.
+    fn relative_error(out: &[f64], measured: &[f64]) -> f64 {
+        let errors = out.iter().zip(measured).map(|(a, b)| (a - b).powi(2));
+        let size: f64 = measured.iter().map(|x| x * x).sum();
+        (errors.sum::<f64>() / size).sqrt()
+    }
+
     fn answer(rate: f64, command: &[f64], nominal: &Nominal, effects: &Effects) -> Vec<f64> {
         let mut out = vec![0.0; command.len()];
         let channels = vec![
@@ -594,9 +601,7 @@ mod tests {
         };
         let off = |measured: &[f64], effects: Effects| {
             let out = answer(rate, &command, &nominal, &effects);
-            let errors = out.iter().zip(measured).map(|(a, b)| (a - b).powi(2));
-            let size: f64 = measured.iter().map(|x| x * x).sum();
-            (errors.sum::<f64>() / size).sqrt()
+            relative_error(&out, measured)
         };
         let none = Effects::off().unwrap();
         let sliding = Effects {
@@ -671,9 +676,7 @@ mod tests {
             };
             let out = answer(rate, &command, &nominal, &effects);
             let measured = measured(integral, rail);
-            let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
-            let size: f64 = measured.iter().map(|x| x * x).sum();
-            (errors.sum::<f64>() / size).sqrt()
+            relative_error(&out, &measured)
         };
 
         let [never, often] = [1e6, 0.9];
@@ -743,9 +746,7 @@ mod tests {
             };
             let out = answer(rate, &command, &nominal, &effects);
             let measured = measured(rail, force * f64::from(held > 0.0));
-            let errors = out.iter().zip(&measured).map(|(a, b)| (a - b).powi(2));
-            let size: f64 = measured.iter().map(|x| x * x).sum();
-            (errors.sum::<f64>() / size).sqrt()
+            relative_error(&out, &measured)
         };
         let (never, often) = (1e3, 0.1);
         for held in [0.0, held] {

@@ -229,10 +229,8 @@ impl Loop {
         };
         let mut sent: [f64; 7] = std::array::from_fn(|i| error[i] + ahead * speed[i]);
         sent[3] += 1.0;
-        let (own_damping, fed_back) = (
-            self.resonance_damping * (1.0 - self.fed_back),
-            2.0 * self.resonance_damping * self.fed_back,
-        );
+        let own_damping = self.resonance_damping * (1.0 - self.fed_back);
+        let fed_back = 2.0 * self.resonance_damping * self.fed_back;
         if has_resonance {
             sent[RATE_SENT] = -fed_back / gain;
         }
@@ -246,7 +244,7 @@ impl Loop {
         moves[1] -= self.spring_droop;
         let flow: [f64; 8] = std::array::from_fn(|i| moves.get(i).map_or(1.0, |s| gain * s));
         // What the flow moves: the table itself, or the mass on the oil.
-        let moved = if has_resonance { 5 } else { 1 };
+        let moved = if has_resonance { RATE } else { 1 };
         let share = if has_resonance {
             1.0 / self.resonance
         } else {
@@ -259,13 +257,14 @@ impl Loop {
             }
             a[(3, place)] = integral * error[i];
         }
+        // What the flow acts on first.
+        let (driven, by) = if pole > 0.0 {
+            (6, pole)
+        } else {
+            (moved, share)
+        };
         for (i, value) in flow.into_iter().enumerate() {
-            let place = column(i);
-            if pole > 0.0 {
-                a[(6, place)] += pole * value;
-            } else {
-                a[(moved, place)] += share * value;
-            }
+            a[(driven, column(i))] += by * value;
         }
         if pole > 0.0 {
             a[(6, 6)] -= pole;
@@ -285,8 +284,7 @@ impl Loop {
             a[(5, 4)] -= share;
             a[(5, 5)] -= 2.0 * own_damping * share;
             // The velocity's rate is less by what friction takes.
-            let (into, by) = if pole > 0.0 { (6, pole) } else { (5, share) };
-            a[(into, friction)] -= by * fed_back * per_friction;
+            a[(driven, friction)] -= by * fed_back * per_friction;
             sent_at_once = -fed_back * per_friction / gain;
         }
         a[(command, slope)] = 1.0;

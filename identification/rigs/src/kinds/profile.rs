@@ -88,10 +88,10 @@ impl<M: InParts> Profiled<'_, M> {
     pub(super) fn open(&self, i: usize, stated: f64) -> Option<Open> {
         let value = self.value(i)?;
         let off = value - stated;
-        Some(match self.end((i, value), -off, off.abs()) {
+        Some(match self.end(TRIES, (i, value), -off, off.abs()) {
             (_, Some(stated)) => Open::Stated(stated),
             (near, None) => {
-                let (far, _) = self.end((i, value), near.copysign(off), f64::INFINITY);
+                let (far, _) = self.end(TRIES, (i, value), near.copysign(off), f64::INFINITY);
                 let ends = [value - near.copysign(off), value + far.copysign(off)];
                 Open::Within(ends[0].min(ends[1]), ends[0].max(ends[1]))
             }
@@ -107,8 +107,7 @@ impl<M: InParts> Profiled<'_, M> {
     /// Whether parameter `i` may also be at `value`. Where a model there is better than the best so far, that one is the
     /// best from now on.
     pub(super) fn may_be(&mut self, i: usize, value: f64) -> bool {
-        let mut starts = self.starts.clone();
-        starts.push(self.best.clone());
+        let starts = self.starts();
         let Some((growth, is_told, there)) = self.fitted((i, value), &starts) else {
             return false;
         };
@@ -124,28 +123,30 @@ impl<M: InParts> Profiled<'_, M> {
         !is_told
     }
 
+    /// Where fits of a held parameter begin.
+    fn starts(&self) -> Vec<Point> {
+        let mut starts = self.starts.clone();
+        starts.push(self.best.clone());
+        starts
+    }
+
     /// The far end of what is open of parameter `i`, to the side of `value`.
     pub(super) fn far_end(&self, i: usize, value: f64) -> Option<f64> {
         let best = self.value(i)?;
-        let (far, _) = self.end_in(QUICK, (i, best), value - best, f64::INFINITY);
+        let (far, _) = self.end(QUICK, (i, best), value - best, f64::INFINITY);
         Some(best + far.copysign(value - best))
-    }
-
-    fn end(&self, of: (usize, f64), first: f64, most: f64) -> (f64, Option<Point>) {
-        self.end_in(TRIES, of, first, most)
     }
 
     /// Distance from the `found` value of parameter `i` at which the error begins to tell, on the side of `first`, which
     /// is tried first; at `most` it ends with the model there.
-    fn end_in(
+    fn end(
         &self,
         tries: usize,
         (i, found): (usize, f64),
         first: f64,
         most: f64,
     ) -> (f64, Option<Point>) {
-        let mut starts = self.starts.clone();
-        starts.push(self.best.clone());
+        let mut starts = self.starts();
         let (mut inside, mut outside, mut at) = (0.0f64, f64::INFINITY, first.abs());
         // Where the error is least, and what it is.
         let mut least = (0.0, 1.0);

@@ -468,16 +468,19 @@ impl Tuned {
 mod tests {
     use super::*;
 
-    #[test]
-    fn wide_bounds_are_searched_in_the_logarithm() {
-        let parameter = |low, high| Parameter {
+    fn parameter(low: f64, high: f64) -> Parameter {
+        Parameter {
             name: "control.gain".to_string(),
             unit: String::new(),
             low,
             high,
             before: low,
             after: low,
-        };
+        }
+    }
+
+    #[test]
+    fn wide_bounds_are_searched_in_the_logarithm() {
         // Middle of the bounds: the geometric mean from a factor of five on, otherwise the arithmetic one.
         for (low, high, middle) in [
             (0.1, 10.0, 1.0),
@@ -501,14 +504,7 @@ mod tests {
     #[test]
     fn values_are_known_through_coordinates_and_back_and_others_are_not() {
         for (low, high) in [(0.1, 10.0), (-3.0, 5.0), (2e5, 9e5)] {
-            let own = Parameter {
-                name: "control.gain".to_string(),
-                unit: String::new(),
-                low,
-                high,
-                before: low,
-                after: low,
-            };
+            let own = parameter(low, high);
             for place in 0..=20 {
                 let value = own.value(f64::from(place) / 20.0);
                 let back = own.value(own.place(value));
