@@ -61,9 +61,6 @@ pub struct Confirmed {
     /// Whether the effects gain on either part, from a fit to the other.
     #[serde(skip)]
     pub(super) pays: bool,
-    /// The effects that differ from zero by the intervals of the fit.
-    #[serde(skip)]
-    clear: Vec<usize>,
     /// Standard errors of the nominal parameters by the fit and its scatter between parts, before other models widen them.
     #[serde(skip)]
     pub(super) of_the_fit: Vec<f64>,
@@ -82,12 +79,16 @@ impl Confirmed {
         self.widen(&other.parameters, &other.effects);
     }
 
-    /// The effects of which the widened intervals hold zero, and those of the fit did not.
+    /// Whether nothing is left to explain of either part.
+    pub(super) fn leaves_nothing(&self) -> bool {
+        self.error < NEAR && self.swapped_error < NEAR
+    }
+
+    /// The effects of which the widened intervals hold zero.
     pub(super) fn vanished(&self, candidates: &[Candidate]) -> Vec<Refused> {
         let own = self.effects.iter().zip(&self.point.effects);
-        let vanished = own.filter(|((_, values), (index, _))| {
-            self.clear.contains(index) && !differs_from_zero(&candidates[*index], values)
-        });
+        let vanished =
+            own.filter(|((_, values), (index, _))| !differs_from_zero(&candidates[*index], values));
         vanished
             .map(|(_, (index, _))| (*index, UNKNOWN.to_owned()))
             .collect()
@@ -489,12 +490,6 @@ pub(super) fn confirm<M: InParts>(
             (name, with_errors(values, first))
         })
         .collect();
-    let pairs = point.effects.iter().zip(&effects);
-    let clear = pairs.filter(|((i, _), (_, values))| {
-        let own = &measured.candidates()[*i];
-        differs_from_zero(own, values)
-    });
-    let clear = clear.map(|((i, _), _)| *i).collect();
     let on = |part: Part| {
         let all = || Some(point.clone());
         on_the_other(measured, all, &fits.parts[part as usize].0, part)
@@ -538,7 +533,6 @@ pub(super) fn confirm<M: InParts>(
         parameters: with_errors(own, 0),
         effects,
         on_one_part,
-        clear,
         of_the_fit: scattered[..count].to_vec(),
         point: point.clone(),
         refitted_point: refitted.clone(),
@@ -696,13 +690,11 @@ mod tests {
                     ],
                 ),
             ];
-            let places: Vec<usize> = effects
-                .iter()
-                .map(|(name, _)| candidates.iter().position(|c| c.effect == *name).unwrap())
-                .collect();
+            let place = |name: &str| candidates.iter().position(|c| c.effect == name).unwrap();
+            let places = effects.iter().map(|(name, _)| (place(name), Vec::new()));
             let point = Point {
                 nuisance: Vec::new(),
-                effects: places.iter().map(|i| (*i, Vec::new())).collect(),
+                effects: places.collect(),
             };
             Confirmed {
                 error: 0.0,
@@ -715,7 +707,6 @@ mod tests {
                 effects,
                 on_one_part: Vec::new(),
                 pays: true,
-                clear: places,
                 of_the_fit: Vec::new(),
                 refitted_point: point.clone(),
                 point,

@@ -5,9 +5,11 @@
 //! on data not fitted and that is found on each part of the data.
 
 mod alternatives;
+mod answer;
 mod between;
 mod carriage;
 mod cause;
+mod causes;
 mod closed_loop_actuator;
 mod confirmed;
 mod controlled_damper;
@@ -31,6 +33,7 @@ mod measured;
 mod named_value;
 mod natural;
 mod oscillator;
+mod part_report;
 mod parts;
 mod positioning_drive;
 mod profile;
@@ -49,13 +52,14 @@ pub use confirmed::Confirmed;
 pub use description::{
     Column, Description, DescriptionError, LeftOut, Quantity, Windows, column_map, renamed,
 };
-pub use diagnosis::{PartEffect, PartReport, RigDiagnosis, SetAside, diagnose};
+pub use diagnosis::{RigDiagnosis, SetAside, diagnose};
 pub use drive::{DriveSearch, RigDrive};
 pub use extended::{ExtendedRig, FileErrors, PredictedColumn, Prediction};
 pub use fitted::{FittedNominal, fit_nominal};
 pub use named_value::NamedValue;
 
 pub use natural::Natural;
+pub use part_report::{PartEffect, PartReport};
 pub use reading::{Measurement, even_period};
 pub use readings::Reading;
 pub use recording::{Begin, RigRecording};
