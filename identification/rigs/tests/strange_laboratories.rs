@@ -92,3 +92,23 @@ fn a_delay_that_lags_make_up_for_is_suspected_with_what_data_leave_open() {
     let sentence = found.sentence();
     assert!(sentence.contains("Perhaps, but not for sure"), "{sentence}");
 }
+
+/// An overlap beside a delay of 8.88 ms, after which an orifice's flow leaves half a percent.
+#[test]
+#[ignore = "slow: a minute"]
+fn an_effect_of_unknown_size_is_not_named_where_nothing_is_left_without_it() {
+    let found = diagnosed(3209);
+    let effects: Vec<&str> = found
+        .confirmed
+        .effects
+        .iter()
+        .map(|own| own.0.as_str())
+        .collect();
+    assert_eq!(effects, ["dead_band"]);
+    let causes: Vec<&str> = found
+        .causes
+        .iter()
+        .map(|own| own.found.name.as_str())
+        .collect();
+    assert_eq!(causes, ["command_delay"]);
+}
