@@ -1,0 +1,9 @@
+//! An FMU that is compiled here, through the calls of both versions of the standard.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod co_simulation;
+mod events;
+mod exchange;
+mod made;
+mod values;
