@@ -12,8 +12,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use fmi_import::{
-    CallError, Datum, FmiVersion, Fmu, Instance, Isolation, Kind, Linear, Options, Processes,
-    Progress, State, Wire, isolation,
+    CallError, Datum, Diverted, FmiVersion, Fmu, Instance, Isolation, Kind, Linear, Options,
+    Processes, Progress, State, Wire, isolation,
 };
 use made::{
     BOTH, COUNT, EARLY, FLOOR, GAIN, PAIR, SLOPE, U, X, Y, answer, begin, exchanged, one, set,
@@ -24,6 +24,9 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [isolation::COMMAND, frame] = *arguments.iter().map(String::as_str).collect::<Vec<_>>() {
         return isolation::guest(Path::new(frame));
+    }
+    if let ["print"] = *arguments.iter().map(String::as_str).collect::<Vec<_>>() {
+        return print();
     }
     for (name, test) in [
         ("values_and_steps", values_and_steps as fn()),
@@ -41,6 +44,10 @@ fn main() -> ExitCode {
         (
             "refusals_are_those_of_their_calls",
             refusals_are_those_of_their_calls,
+        ),
+        (
+            "what_is_printed_meanwhile_goes_to_the_standard_error",
+            what_is_printed_meanwhile_goes_to_the_standard_error,
         ),
         (
             "the_end_of_the_process_is_an_error",
@@ -112,6 +119,13 @@ fn values_and_steps() {
         own.get_exact(&kind, &[reference], &mut read).unwrap();
         assert_eq!(read, [datum]);
     }
+    let three = ["first", "", "the third"].map(|text| Datum::Text(text.into()));
+    own.set_exact(&Kind::String, &[101, 100, 101], &three)
+        .unwrap();
+    let mut read = three.clone();
+    own.get_exact(&Kind::String, &[100, 101, 100], &mut read)
+        .unwrap();
+    assert_eq!(read, [1, 2, 1].map(|at| three[at].clone()));
     let mut changes = [0.0; 2];
     let given = own.derivative((&[Y, SLOPE], &mut changes), (&[U, X], &[3.0, 5.0]));
     assert!(given.unwrap());
@@ -306,6 +320,12 @@ fn refusals_are_those_of_their_calls() {
             "{text}"
         );
     }
+    // An error has the time at which its step began, whatever the FMU says.
+    let mut own = apart(&stepped(FmiVersion::V3, "", ""));
+    own.do_step(0.0, 0.5).unwrap();
+    answer(&mut own, 3);
+    let error = own.do_step(0.5, 0.5).unwrap_err();
+    assert_eq!((&*error.outcome, error.time), ("returned error", 0.5));
     let mut own = apart(&stepped(FmiVersion::V3, "", ""));
     own.set(&Kind::Boolean, &[EARLY], &[1.0]).unwrap();
     let error = own.do_step(0.0, 0.5).unwrap_err();
@@ -364,4 +384,27 @@ fn the_end_of_the_process_is_an_error() {
     let error = lost(102, Duration::from_millis(300));
     let outcome = "did not return within 0.3 s and was stopped (--call-limit)";
     assert_eq!(error.outcome, outcome);
+}
+
+/// Prints before, while the standard output is diverted, and after.
+fn print() -> ExitCode {
+    println!("before");
+    let both = [Diverted::new(), Diverted::new()];
+    for own in both {
+        println!("meanwhile");
+        drop(own);
+    }
+    println!("after");
+    ExitCode::SUCCESS
+}
+
+fn what_is_printed_meanwhile_goes_to_the_standard_error() {
+    let program = std::env::current_exe().unwrap();
+    let output = std::process::Command::new(program).arg("print").output();
+    let output = output.unwrap();
+    let [out, error] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    if cfg!(unix) {
+        assert_eq!(out, "before\nafter\n");
+        assert_eq!(error, "meanwhile\nmeanwhile\n");
+    }
 }

@@ -288,3 +288,64 @@ fn descriptions_that_cannot_be_used_are_refused() {
     assert!(many.contains("elements"), "{many}");
     assert!(opened(&third("", "", "")).is_err());
 }
+
+#[test]
+fn names_of_outputs_are_known_with_their_aliases_and_only_tunable_parameters_can_be_tuned() {
+    let variables = r#"
+        <Float64 name="u" valueReference="1" causality="input" start="2"><Alias name="in"/></Float64>
+        <Float64 name="y" valueReference="2" causality="output"><Alias name="z"/><Alias name="out"/></Float64>
+        <Float64 name="a" valueReference="3" causality="output"><Dimension start="2"/><Alias name="b"/></Float64>
+        <Float64 name="p" valueReference="4" causality="parameter" variability="tunable" start="1"/>
+        <Float64 name="q" valueReference="5" causality="parameter" variability="fixed" start="1"/>
+        <Int32 name="n" valueReference="6" causality="parameter" variability="tunable" start="1"/>
+        <Float64 name="r" valueReference="7" causality="parameter" variability="tunable" start="1 2">
+            <Dimension start="2"/></Float64>"#;
+    let fmu = opened(&third(STEPS, variables, "")).unwrap();
+    let own = &fmu.description;
+    let aliases: Vec<(String, usize)> = own.output_aliases().collect();
+    let named = |name: &str, at| (name.to_string(), at);
+    assert_eq!(
+        aliases,
+        [
+            named("b[1]", 2),
+            named("b[2]", 3),
+            named("out", 1),
+            named("z", 1)
+        ]
+    );
+    assert_eq!((own.position("in"), own.array("b")), (Some(0), Some(2..4)));
+    let those = |is: fn(&fmi_import::Variable) -> bool| -> Vec<&str> {
+        let all = own.variables.iter().filter(|variable| is(variable));
+        all.map(|variable| &*variable.name).collect()
+    };
+    assert_eq!(
+        those(fmi_import::Variable::is_tunable),
+        ["p", "n", "r[1]", "r[2]"]
+    );
+    let numbers = ["u", "y", "p", "q"];
+    assert_eq!(those(fmi_import::Variable::is_real_number), numbers);
+}
+
+#[test]
+fn names_that_occur_twice_are_refused_with_their_places() {
+    let twice = r#"<Float64 name="y" valueReference="1"/><Float64 name="z" valueReference="2"/>
+        <Float64 name="y" valueReference="3"/>"#;
+    let refused = opened(&third(STEPS, twice, "")).unwrap_err();
+    assert!(
+        refused.contains("`y` occurs twice (as number 1 and 3)"),
+        "{refused}"
+    );
+    let alias = r#"<Float64 name="y" valueReference="1"/>
+        <Float64 name="z" valueReference="2"><Alias name="y"/></Float64>"#;
+    let refused = opened(&third(STEPS, alias, "")).unwrap_err();
+    assert!(
+        refused.contains("the alias `y` is also a variable"),
+        "{refused}"
+    );
+    let output = r#"<Output valueReference="7"/>"#;
+    let refused = opened(&third(STEPS, "", output)).unwrap_err();
+    assert!(
+        refused.contains("lists an output that is not among the variables"),
+        "{refused}"
+    );
+}

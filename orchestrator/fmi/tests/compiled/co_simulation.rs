@@ -6,8 +6,8 @@ use std::sync::Arc;
 use fmi_import::{FmiVersion, Instance, Kind, Progress, State};
 
 use crate::made::{
-    BOTH, EARLY, GAIN, OVER, U, X, Y, answer, begin, compile, instance, logged, packed, running,
-    set, source, stepped, texts, value,
+    ANSWER, BOTH, EARLY, GAIN, OVER, U, X, Y, answer, begin, compile, instance, logged, packed,
+    running, set, source, stepped, texts, value,
 };
 
 #[test]
@@ -87,6 +87,14 @@ fn an_error_ends_the_run_and_a_fatal_one_forbids_every_call() {
             assert_eq!(error.outcome, outcome);
             assert_eq!(error.messages, ["the step is 100 % wrong"]);
             let next = own.get(&Kind::Float64, &[X], &mut [0.0]);
+            if status == 4 {
+                let set = own.set(&Kind::Float64, &[U], &[1.0]).unwrap_err();
+                let whole = own.set(&Kind::Int32, &[ANSWER], &[0.0]).unwrap_err();
+                let step = own.do_step(0.5, 0.5).unwrap_err();
+                for error in [set, whole, step] {
+                    assert_eq!(error.outcome, "cannot follow a fatal error");
+                }
+            }
             let after = next.err().map(|error| error.outcome);
             let forbidden = (status == 4).then(|| "cannot follow a fatal error".to_string());
             assert_eq!(after, forbidden);
@@ -274,5 +282,21 @@ fn a_kept_state_is_gone_back_to_here_and_in_another_instance() {
         );
         // Bytes of something else.
         assert!(other.state_of_bytes(&bytes[1..]).is_err());
+    }
+}
+
+/// Of the host's own computing, whatever the FMU did to the unit that computes.
+#[test]
+fn an_fmu_does_not_change_how_the_host_rounds() {
+    for version in BOTH {
+        let mut own = running(&stepped(version, "", ""), &[]);
+        answer(&mut own, 103);
+        own.do_step(0.0, 0.5).unwrap();
+        let [two, three] = [2.0, 3.0].map(std::hint::black_box::<f64>);
+        // The nearest number is above two thirds.
+        assert_eq!((two / three).to_bits(), 0x3fe5_5555_5555_5555);
+        assert_eq!((3.0 * (two / three)).to_bits(), 2.0_f64.to_bits());
+        answer(&mut own, 0);
+        own.do_step(0.5, 0.5).unwrap();
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::LN_2;
 use fmi_import::{FmiVersion, Instance, Kind};
 
 use crate::made::{
-    COUNT, FLOOR, PERIOD, X, begin, instance, logged, one, running, stepped, texts, value,
+    COUNT, FAILS, FLOOR, PERIOD, X, begin, instance, logged, one, running, stepped, texts, value,
 };
 
 const EVENTS: &str = r#"hasEventMode="true" canHandleVariableCommunicationStepSize="true""#;
@@ -94,4 +94,14 @@ fn clocks_of_an_fmu_without_event_mode_do_not_tick() {
     );
     own.set(&Kind::Clock, &[131], &[1.0]).unwrap();
     assert_eq!(one(&mut own, &Kind::Clock, 131), 0.0);
+}
+
+#[test]
+fn a_failure_between_two_events_has_the_time_of_the_first() {
+    let mut own = running(
+        &stepped(FmiVersion::V3, EVENTS, ""),
+        &[(PERIOD, 0.25), (FAILS, 0.5)],
+    );
+    let error = own.do_step(0.0, 1.0).unwrap_err();
+    assert_eq!((&*error.call, error.time), ("fmi3DoStep", 0.5));
 }

@@ -19,6 +19,7 @@ pub const SLOPE: u32 = 5;
 pub const PAIR: u32 = 6;
 pub const FLOOR: u32 = 7;
 pub const PERIOD: u32 = 8;
+pub const FAILS: u32 = 11;
 
 /// Value references of its Int32: the status of the next steps, and how many events there were.
 pub const ANSWER: u32 = 70;

@@ -362,8 +362,8 @@ shared! {
         _c, references: References, n: usize, values: *mut f64, qualifiers: *mut c_int
     ) {
         unsafe { places(values, n) }.fill(0.25);
-        // 2: changed, which the first one is.
-        unsafe { places(qualifiers, n) }.fill(2);
+        // 1: unchanged.
+        unsafe { places(qualifiers, n) }.fill(1);
         if unsafe { list(references, n) } == [130] { OK } else { ERROR }
     }
 }

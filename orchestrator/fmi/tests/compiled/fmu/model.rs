@@ -18,11 +18,13 @@ pub(crate) const FLOOR: u32 = 7;
 pub(crate) const PERIOD: u32 = 8;
 pub(crate) const TOLERANCE: u32 = 9;
 pub(crate) const STOP: u32 = 10;
+pub(crate) const FAILS: u32 = 11;
 
 /// What a step does in place of a status.
 pub(crate) const ABORT: c_int = 100;
 pub(crate) const EXIT: c_int = 101;
 pub(crate) const HANG: c_int = 102;
+pub(crate) const ROUND_DOWN: c_int = 103;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Mode {
@@ -47,6 +49,7 @@ pub(crate) struct State {
     pub(crate) floor: f64,
     pub(crate) period: f64,
     pub(crate) next: f64,
+    pub(crate) fails: f64,
     pub(crate) tolerance: f64,
     pub(crate) stop: f64,
     pub(crate) count: i32,
@@ -101,6 +104,7 @@ impl Instance {
             floor: 0.0,
             period: 0.0,
             next: f64::INFINITY,
+            fails: f64::INFINITY,
             tolerance: -1.0,
             stop: -1.0,
             count: 0,
@@ -183,13 +187,19 @@ impl Instance {
         if self.mode != Stepping || time != self.now.time || step <= 0.0 {
             return (ERROR, self.now.time, false);
         }
-        match self.answer {
+        let answer = if time >= self.now.fails {
+            ERROR
+        } else {
+            self.answer
+        };
+        match answer {
             WARNING => (self.log)(WARNING, "the step is rough"),
             DISCARD => {
                 self.discarded_at = time + step / 2.0;
                 return (DISCARD, self.discarded_at, false);
             }
             OK => {}
+            ROUND_DOWN => round_down(),
             ABORT => {
                 eprintln!("the last words");
                 std::process::abort();
@@ -200,7 +210,8 @@ impl Instance {
             },
             status => {
                 (self.log)(status, "the step is 100 % wrong");
-                return (status, time, false);
+                // How far it came does not count then.
+                return (status, time + step / 2.0, false);
             }
         }
         let whole = if self.is_early { step / 2.0 } else { step };
@@ -210,7 +221,7 @@ impl Instance {
             self.now.x = self.now.floor;
             if self.handles_events {
                 self.now.time = time + whole - left;
-                return (self.answer, self.now.time, true);
+                return (self.status(), self.now.time, true);
             }
             self.now.time = time + whole - left;
             self.update();
@@ -220,7 +231,12 @@ impl Instance {
         if !self.handles_events && self.now.time >= self.now.next - 1e-9 {
             self.update();
         }
-        (self.answer, self.now.time, false)
+        (self.status(), self.now.time, false)
+    }
+
+    /// The status of a step that was made.
+    pub(crate) fn status(&self) -> c_int {
+        if self.answer == WARNING { WARNING } else { OK }
     }
 
     pub(crate) fn real(&mut self, reference: u32) -> Option<&mut [f64]> {
@@ -231,6 +247,7 @@ impl Instance {
             X => &mut now.x,
             FLOOR => &mut now.floor,
             PERIOD => &mut now.period,
+            FAILS => &mut now.fails,
             PAIR => return Some(&mut now.pair),
             _ => return None,
         };
@@ -308,5 +325,15 @@ impl Instance {
             (SLOPE, X) => -1.0,
             _ => 0.0,
         }
+    }
+}
+
+/// Rounds down from now on, in both units, as an FMU must not.
+fn round_down() {
+    #[cfg(target_arch = "x86_64")]
+    unsafe {
+        let (sse, x87) = (0x3f80_u32, 0x077f_u16);
+        std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const sse, options(nostack));
+        std::arch::asm!("fldcw [{}]", in(reg) &raw const x87, options(nostack));
     }
 }
