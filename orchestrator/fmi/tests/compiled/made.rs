@@ -38,6 +38,7 @@ const VARIABLES_2: &str = r#"
 <ScalarVariable name="x" valueReference="4" causality="output"><Real/></ScalarVariable>
 <ScalarVariable name="slope" valueReference="5"><Real derivative="4"/></ScalarVariable>
 <ScalarVariable name="answer" valueReference="70" causality="parameter" variability="tunable"><Integer start="0"/></ScalarVariable>
+<ScalarVariable name="over" valueReference="121" causality="parameter" variability="tunable"><Boolean start="false"/></ScalarVariable>
 "#;
 
 const VARIABLES_3: &str = r#"
@@ -48,6 +49,7 @@ const VARIABLES_3: &str = r#"
 <Float64 name="slope" valueReference="5" derivative="4"/>
 <Float64 name="pair" valueReference="6" causality="input" start="0 0"><Dimension start="2"/></Float64>
 <Int32 name="answer" valueReference="70" causality="parameter" variability="tunable" start="0"/>
+<Boolean name="over" valueReference="121" causality="parameter" variability="tunable" start="false"/>
 "#;
 
 /// The description, with `attributes` of each of its interfaces and `more` variables (FMI 3.0).
@@ -100,7 +102,10 @@ pub fn compile(source: &Path) -> Vec<u8> {
 
 /// The folder of the FMU's source.
 pub fn source() -> &'static Path {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/compiled/fmu"))
+    Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../fmi/tests/compiled/fmu"
+    ))
 }
 
 /// The library.

@@ -34,8 +34,13 @@ fn the_iterative_coupling_is_the_trapezoidal_rule() {
 /// The input over a step is its value at the middle, on the line through the last two.
 #[test]
 fn the_coupling_in_order_extrapolates_to_the_middle_of_the_step() {
-    let plan = Plan::fixed(STEP, 2.0);
-    let outcome = run(RING, &mut parts(10.0), &Samples::none(STEP), &plan, 20);
+    for plan in [Plan::fixed(STEP, 2.0), varying(1e-3, Some(STEP))] {
+        extrapolates(&plan);
+    }
+}
+
+fn extrapolates(plan: &Plan) {
+    let outcome = run(RING, &mut parts(10.0), &Samples::none(STEP), plan, 20);
     let [x, v] = ["x.y", "v.y"].map(|name| outcome.record.column(name).unwrap());
     for n in 1..19 {
         let middle = 1.5 * v[n] - 0.5 * v[n - 1];

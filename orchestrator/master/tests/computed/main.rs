@@ -2,8 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod compiled;
 mod coupling;
 mod kinds;
+#[allow(dead_code, reason = "other tests need more")]
+#[path = "../../../fmi/tests/compiled/made.rs"]
+mod made;
 mod moments;
 mod parts;
 

@@ -328,3 +328,54 @@ fn a_parameter_moves_along_its_line_and_the_run_can_be_repeated() {
         assert!(refused.contains(reason), "{refused}");
     }
 }
+
+#[test]
+fn endings_have_a_word_a_time_and_a_reason() {
+    let fault = || MasterError::Over("part".to_string());
+    for (ended, word, time, is_regular) in [
+        (Ended::Complete, "complete", None, true),
+        (
+            Ended::Interrupted { time: 2.5 },
+            "interrupted",
+            Some(2.5),
+            false,
+        ),
+        (
+            Ended::Terminated {
+                component: "part".to_string(),
+                time: 1.5,
+            },
+            "terminated",
+            Some(1.5),
+            true,
+        ),
+        (
+            Ended::Interlock {
+                signal: "part.tripped".to_string(),
+                time: 0.5,
+                cause: None,
+            },
+            "interlock",
+            Some(0.5),
+            false,
+        ),
+        (Ended::Failed(fault()), "failed", None, false),
+        (
+            Ended::Stopped {
+                error: fault(),
+                time: 3.5,
+            },
+            "failed",
+            Some(3.5),
+            false,
+        ),
+    ] {
+        assert_eq!((ended.kind().word(), ended.time()), (word, time));
+        assert_eq!(ended.is_regular(), is_regular);
+        let reason = ended.reason();
+        assert_eq!(reason.is_none(), word == "complete");
+        let said = reason.unwrap_or_default();
+        let is_named = time.is_none_or(|time| said.contains(&format!("{time}")));
+        assert!(is_named, "{said}");
+    }
+}
