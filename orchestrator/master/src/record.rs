@@ -192,8 +192,7 @@ mod tests {
 
     #[test]
     fn a_row_has_the_signals_that_are_kept_and_some_again() {
-        let mut own = Record::default();
-        own.columns = vec![String::new(); 5];
+        let mut own = Record::with_capacity(vec![String::new(); 5], 1);
         own.push_with(0.5, &[1.0, 2.0, 3.0, 4.0], &[0..1, 2..4], &[1], &[]);
         let rows: Vec<&[f64]> = own.rows().collect();
         assert_eq!(rows, [[0.5, 1.0, 3.0, 4.0, 2.0]]);

@@ -53,7 +53,7 @@ const VARIABLES_3: &str = r#"
 "#;
 
 /// The description, with `attributes` of each of its interfaces and `more` variables (FMI 3.0).
-fn description(version: FmiVersion, interfaces: [Option<&str>; 2], more: &str) -> String {
+pub fn description(version: FmiVersion, interfaces: [Option<&str>; 2], more: &str) -> String {
     let names = ["CoSimulation", "ModelExchange"]
         .into_iter()
         .zip(interfaces);
@@ -109,7 +109,7 @@ pub fn source() -> &'static Path {
 }
 
 /// The library.
-fn library() -> &'static [u8] {
+pub fn library() -> &'static [u8] {
     static LIBRARY: OnceLock<Vec<u8>> = OnceLock::new();
     LIBRARY.get_or_init(|| compile(&source().join("lib.rs")))
 }
@@ -118,7 +118,13 @@ fn library() -> &'static [u8] {
 pub fn packed(description: &str, library: &[u8]) -> Arc<Fmu> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("Minimal.fmu");
-    let mut archive = ZipWriter::new(File::create(&path).unwrap());
+    pack(&path, description, library, &[]);
+    Fmu::open(&path).unwrap()
+}
+
+/// Writes an FMU with `more` files.
+pub fn pack(path: &Path, description: &str, library: &[u8], more: &[(&str, &str)]) {
+    let mut archive = ZipWriter::new(File::create(path).unwrap());
     let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
     let mut add = |name: &str, bytes: &[u8]| {
         archive.start_file(name, options).unwrap();
@@ -130,8 +136,10 @@ pub fn packed(description: &str, library: &[u8]) -> Arc<Fmu> {
         let extension = fmi_rs::SHARED_LIBRARY_EXTENSION;
         add(&format!("binaries/{platform}/minimal{extension}"), library);
     }
+    for (name, text) in more {
+        add(name, text.as_bytes());
+    }
     archive.finish().unwrap();
-    Fmu::open(&path).unwrap()
 }
 
 /// The FMU of a description, opened once.

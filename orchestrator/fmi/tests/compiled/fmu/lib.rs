@@ -55,12 +55,20 @@ mod model;
 mod states;
 mod values;
 
+/// What an FMU with this token answers at its beginning: `minimal`, or `minimal 3` for the status 3.
+fn answer(token: &str) -> Option<c_int> {
+    match token.strip_prefix("minimal")? {
+        "" => Some(OK),
+        rest => rest.trim().parse().ok(),
+    }
+}
+
 /// Whether an FMU of this name is made: those that are called `refused` are not.
 fn is_welcome(name: &str, token: &str, log: &dyn Fn(c_int, &str)) -> bool {
     if name == "refused" {
         log(ERROR, "no instance has this name");
     }
-    name != "refused" && token == "minimal"
+    name != "refused" && answer(token).is_some()
 }
 
 macro_rules! both {
@@ -160,11 +168,8 @@ unsafe extern "C" fn fmi2Instantiate(
     if !is_welcome(&name, &token, &log) {
         return std::ptr::null_mut();
     }
-    Instance::new(
-        false,
-        if kind == 0 { Continuous } else { Stepping },
-        Box::new(log),
-    )
+    let running = if kind == 0 { Continuous } else { Stepping };
+    Instance::new(answer(&token), false, running, Box::new(log))
 }
 
 type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
@@ -187,7 +192,7 @@ unsafe fn instantiate3(
     if !is_welcome(&name, &token, &log) || (name == "stepped" && handles_events) {
         return std::ptr::null_mut();
     }
-    Instance::new(handles_events, running, Box::new(log))
+    Instance::new(answer(&token), handles_events, running, Box::new(log))
 }
 
 #[unsafe(no_mangle)]

@@ -25,6 +25,11 @@ pub(crate) const ABORT: c_int = 100;
 pub(crate) const EXIT: c_int = 101;
 pub(crate) const HANG: c_int = 102;
 pub(crate) const ROUND_DOWN: c_int = 103;
+/// Its derivatives are a tenth too large.
+pub(crate) const TOO_LARGE: c_int = 104;
+/// It discards derivatives, or refuses them.
+pub(crate) const NO_DERIVATIVE: c_int = 105;
+pub(crate) const WRONG_DERIVATIVE: c_int = 106;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Mode {
@@ -91,6 +96,7 @@ pub(crate) struct Instance {
 
 impl Instance {
     pub(crate) fn new(
+        answer: Option<c_int>,
         handles_events: bool,
         running: Mode,
         log: Box<dyn Fn(c_int, &str)>,
@@ -116,7 +122,7 @@ impl Instance {
             handles_events,
             now,
             kept: Kept::default(),
-            answer: OK,
+            answer: answer.unwrap_or(OK),
             is_early: false,
             is_over: false,
             is_reset: false,
@@ -184,7 +190,7 @@ impl Instance {
 
     /// Steps; gives the status, how far it came, and whether it is an event that ended it.
     pub(crate) fn step(&mut self, time: f64, step: f64) -> (c_int, f64, bool) {
-        if self.mode != Stepping || time != self.now.time || step <= 0.0 {
+        if self.mode != Stepping || !((time - self.now.time).abs() < 1e-9) || step <= 0.0 {
             return (ERROR, self.now.time, false);
         }
         let answer = if time >= self.now.fails {
@@ -200,6 +206,7 @@ impl Instance {
             }
             OK => {}
             ROUND_DOWN => round_down(),
+            TOO_LARGE | NO_DERIVATIVE | WRONG_DERIVATIVE => {}
             ABORT => {
                 eprintln!("the last words");
                 std::process::abort();
@@ -320,10 +327,15 @@ impl Instance {
 
     /// `d unknown / d known`.
     pub(crate) fn partial(&self, unknown: u32, known: u32) -> f64 {
-        match (unknown, known) {
+        let true_one = match (unknown, known) {
             (Y, U) => self.now.gain,
             (SLOPE, X) => -1.0,
             _ => 0.0,
+        };
+        if self.answer == TOO_LARGE {
+            1.1 * true_one
+        } else {
+            true_one
         }
     }
 }

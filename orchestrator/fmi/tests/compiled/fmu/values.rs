@@ -190,7 +190,11 @@ mod derivatives_by_variables {
             into: *mut f64, count: usize
         ) {
             let (unknowns, knowns, seed) = unsafe { (list(unknowns, n), list(knowns, m), list(seed, seeds)) };
-            if c.answer == DISCARD { return DISCARD }
+            match c.answer {
+                DISCARD | NO_DERIVATIVE => return DISCARD,
+                WRONG_DERIVATIVE => return ERROR,
+                _ => {}
+            }
             for (place, &unknown) in unsafe { places(into, count) }.iter_mut().zip(unknowns) {
                 let terms = knowns.iter().zip(seed);
                 *place = terms.map(|(&known, change)| c.partial(unknown, known) * change).sum();
