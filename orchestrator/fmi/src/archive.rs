@@ -431,6 +431,26 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_is_no_archive_is_told_from_a_damaged_one() {
+        for (bytes, words) in [
+            (&b""[..], "the file is empty"),
+            (
+                b"PK\x03\x04 and no more",
+                "the zip archive is damaged or cut short",
+            ),
+            (b"text", "it is not a zip archive"),
+        ] {
+            let error = ZipArchive::new(Cursor::new(bytes)).err().unwrap();
+            assert!(unreadable(bytes, &error).starts_with(words));
+            let refused = unpack(FMU, Path::new("Own.fmu"), bytes).err().unwrap();
+            assert!(refused.to_string().contains(words), "{refused}");
+        }
+        let none = unpack(FMU, Path::new("Own.fmu"), &zipped(&["a.txt"]));
+        let refused = none.err().unwrap().to_string();
+        assert!(refused.ends_with("the archive has no modelDescription.xml at its top"));
+    }
+
+    #[test]
     fn an_archive_that_claims_to_hold_too_much_is_not_unpacked() {
         let claiming = |size: u32| {
             let mut bytes = zipped(&["modelDescription.xml", "b.txt"]);

@@ -42,6 +42,14 @@ fn main() -> ExitCode {
         ),
         ("wires_lead_from_step_to_step", wires_lead_from_step_to_step),
         (
+            "a_step_among_others_that_fails_is_that_of_its_instance",
+            a_step_among_others_that_fails_is_that_of_its_instance,
+        ),
+        (
+            "what_an_fmu_prints_is_its_message",
+            what_an_fmu_prints_is_its_message,
+        ),
+        (
             "refusals_are_those_of_their_calls",
             refusals_are_those_of_their_calls,
         ),
@@ -407,4 +415,58 @@ fn what_is_printed_meanwhile_goes_to_the_standard_error() {
         assert_eq!(out, "before\nafter\n");
         assert_eq!(error, "meanwhile\nmeanwhile\n");
     }
+}
+
+fn a_step_among_others_that_fails_is_that_of_its_instance() {
+    for (does, outcome, is_lost) in [
+        (3, "returned error", false),
+        (2, "returned discard (it came to 0.25 s)", false),
+        (101, "ended its process by exit(3)", true),
+    ] {
+        let mut all: [Instance; 3] = together(&stepped(FmiVersion::V3, "", ""));
+        answer(&mut all[1], does);
+        for own in &mut all {
+            set(own, U, 3.0);
+            assert!(own.request_step(0.0, 0.5, false));
+        }
+        let [first, second, third] = &mut all;
+        assert_eq!(first.finish_step().unwrap().0, Progress::Whole);
+        let error = second.finish_step().unwrap_err();
+        assert_eq!((&*error.instance, &*error.outcome), ("part_1", outcome));
+        let last = third.finish_step();
+        if is_lost {
+            assert!(last.is_err());
+            continue;
+        }
+        assert_eq!(last.unwrap().0, Progress::Whole);
+        for own in [first, third] {
+            assert_eq!((value(own, X), value(own, Y)), ((-0.5_f64).exp(), 6.0));
+        }
+    }
+    // What is set before a step is refused.
+    let mut all: [Instance; 2] = together(&stepped(FmiVersion::V2, "", ""));
+    set(&mut all[0], GAIN, -1.0);
+    assert!(all.iter_mut().all(|own| own.request_step(0.0, 0.5, false)));
+    let error = all[0].finish_step().unwrap_err();
+    assert_eq!(
+        (&*error.call, &error.variables[..]),
+        ("fmi2SetReal", &["gain".to_string()][..])
+    );
+    assert_eq!(all[1].finish_step().unwrap().0, Progress::Whole);
+}
+
+fn what_an_fmu_prints_is_its_message() {
+    let mut all: [Instance; 2] = together(&stepped(FmiVersion::V3, "", ""));
+    all[1].take_messages();
+    answer(&mut all[1], 107);
+    all[1].do_step(0.0, 0.5).unwrap();
+    let line = "printed on standard output: a line".to_string();
+    let begun = std::time::Instant::now();
+    while !texts(&all[1]).contains(&line) {
+        assert!(begun.elapsed() < Duration::from_secs(20));
+        std::thread::yield_now();
+    }
+    // From then on each is called by itself, so that lines bear the right names.
+    assert!(!all[0].request_step(0.0, 0.5, false));
+    assert_eq!(all[0].do_step(0.0, 0.5).unwrap(), Progress::Whole);
 }

@@ -3,11 +3,11 @@
 use std::path::MAIN_SEPARATOR;
 use std::sync::Arc;
 
-use fmi_import::{FmiVersion, Instance, Kind, Progress, State};
+use fmi_import::{CURE, FmiVersion, Fmu, Instance, Kind, Progress, State};
 
 use crate::made::{
-    ANSWER, BOTH, EARLY, GAIN, OVER, U, X, Y, answer, begin, compile, instance, logged, packed,
-    running, set, source, stepped, texts, value,
+    ANSWER, BOTH, EARLY, GAIN, OVER, U, X, Y, answer, begin, compile, description, instance,
+    library, logged, pack, packed, running, set, source, stepped, texts, value,
 };
 
 #[test]
@@ -299,4 +299,46 @@ fn an_fmu_does_not_change_how_the_host_rounds() {
         answer(&mut own, 0);
         own.do_step(0.5, 0.5).unwrap();
     }
+}
+
+#[test]
+fn an_instance_in_this_process_takes_no_requests() {
+    let mut own = running(&stepped(FmiVersion::V3, "", ""), &[]);
+    assert!(!own.is_apart() && own.process().is_none() && own.is_settled());
+    assert!(!own.request_step(0.0, 1.0, false));
+    let step = (0.0, 1.0, false);
+    assert_eq!(own.request_wired_step(step, &[], (&[Y], 1)), None);
+    let read = (&Kind::Float64, &[Y][..], 1);
+    assert_eq!(
+        (own.foresee((&[], &[], &[]), read), own.exchanges()),
+        (None, 0)
+    );
+    let error = own.finish_step().unwrap_err();
+    assert_eq!(error.outcome, "was not requested");
+}
+
+#[test]
+fn a_library_that_is_missing_is_named_with_what_to_do_for_a_component_of_this_project() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("Own.fmu");
+    let text = description(FmiVersion::V3, [Some(""), None], "");
+    let text = text.replace(r#"modelIdentifier="minimal""#, r#"modelIdentifier="other""#);
+    pack(&path, &text, library(), &[]);
+    for (fmu, is_own) in [(Fmu::open(&path), false), (Fmu::open_own(&path), true)] {
+        let fmu = fmu.unwrap();
+        let refused = Instance::new(&fmu, "one", &logged())
+            .err()
+            .unwrap()
+            .to_string();
+        assert!(
+            refused.contains("is missing (is the modelIdentifier right?)"),
+            "{refused}"
+        );
+        assert_eq!(refused.contains(CURE), is_own);
+        assert!(fmu.hold().is_none());
+    }
+    assert!(stepped(FmiVersion::V3, "", "").hold().is_none());
+    let text = description(FmiVersion::V3, [Some(""), None], "");
+    pack(&path, &text, library(), &[]);
+    assert!(Fmu::open_own(&path).unwrap().hold().is_some());
 }

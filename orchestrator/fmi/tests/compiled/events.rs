@@ -5,7 +5,8 @@ use std::f64::consts::LN_2;
 use fmi_import::{FmiVersion, Instance, Kind};
 
 use crate::made::{
-    COUNT, FAILS, FLOOR, PERIOD, X, begin, instance, logged, one, running, stepped, texts, value,
+    COUNT, FAILS, FLOOR, PERIOD, TICKS, X, begin, instance, logged, one, running, set, stepped,
+    texts, value,
 };
 
 const EVENTS: &str = r#"hasEventMode="true" canHandleVariableCommunicationStepSize="true""#;
@@ -71,7 +72,7 @@ fn an_input_clock_ticks_at_the_fmu_s_interval_and_an_output_clock_is_read() {
         (0.75, 0.25, 5.0, 0.0),
     ] {
         own.do_step(time, step).unwrap();
-        assert_eq!(one(&mut own, &Kind::Int32, 72), ticks, "{time}");
+        assert_eq!(one(&mut own, &Kind::Int32, TICKS), ticks, "{time}");
         assert_eq!(one(&mut own, &Kind::Clock, 131), tock, "{time}");
     }
     let all = texts(&own);
@@ -104,4 +105,18 @@ fn a_failure_between_two_events_has_the_time_of_the_first() {
     );
     let error = own.do_step(0.0, 1.0).unwrap_err();
     assert_eq!((&*error.call, error.time), ("fmi3DoStep", 0.5));
+}
+
+#[test]
+fn events_and_clocks_count_from_the_start_of_the_run() {
+    let clock = r#"<Clock name="tick" valueReference="130" causality="input" intervalVariability="fixed"
+        intervalDecimal="0.5" shiftDecimal="0.25"/>"#;
+    let mut own = instance(&stepped(FmiVersion::V3, EVENTS, clock));
+    own.enter_initialization(5.125, 10.0).unwrap();
+    set(&mut own, PERIOD, 0.25);
+    own.exit_initialization().unwrap();
+    // At 5.375 and 5.875; events at 5.375, 5.625, 5.875 and 6.125.
+    own.do_step(5.125, 1.0).unwrap();
+    assert_eq!(one(&mut own, &Kind::Int32, TICKS), 2.0);
+    assert_eq!(one(&mut own, &Kind::Int32, COUNT), 4.0);
 }

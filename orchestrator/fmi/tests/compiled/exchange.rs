@@ -93,6 +93,13 @@ fn a_kept_state_holds_the_solver_s() {
         own.restore_state(&state).unwrap();
         own.do_step(0.5, 0.5).unwrap();
         assert_eq!(value(&mut own, X), first);
+        // Another one is kept beside it.
+        let mut later = State::default();
+        own.save_state(&mut later).unwrap();
+        own.restore_state(&state).unwrap();
+        own.do_step(0.5, 0.5).unwrap();
+        assert_eq!(value(&mut own, X), first);
+        own.free_state(later).unwrap();
         let bytes = own.state_as_bytes(&state).unwrap();
         let mut other = running(&fmu, &[(FLOOR, 0.5)]);
         let read = other.state_of_bytes(&bytes).unwrap();
@@ -113,4 +120,15 @@ fn an_fmu_without_model_exchange_is_refused_for_it() {
                 .ends_with("it does not offer model exchange")
         );
     }
+}
+
+#[test]
+fn many_events_are_borne_and_endless_ones_are_not() {
+    let mut own = running(&exchanged(FmiVersion::V3, ""), &[(PERIOD, 1e-3)]);
+    own.do_step(0.0, 1.5005).unwrap();
+    assert_eq!(one(&mut own, &Kind::Int32, COUNT), 1500.0);
+    let mut own = running(&exchanged(FmiVersion::V3, ""), &[(PERIOD, 1e-16)]);
+    let error = own.do_step(0.0, 1.0).unwrap_err();
+    let front = "has endless events at 0.000000000000";
+    assert!(error.outcome.starts_with(front), "{error}");
 }

@@ -24,6 +24,8 @@ pub const FAILS: u32 = 11;
 /// Value references of its Int32: the status of the next steps, and how many events there were.
 pub const ANSWER: u32 = 70;
 pub const COUNT: u32 = 71;
+/// How often its clock has ticked.
+pub const TICKS: u32 = 72;
 
 /// Value references of its Boolean: steps return early; it asks to end the run.
 pub const EARLY: u32 = 120;

@@ -30,6 +30,7 @@ pub(crate) const TOO_LARGE: c_int = 104;
 /// It discards derivatives, or refuses them.
 pub(crate) const NO_DERIVATIVE: c_int = 105;
 pub(crate) const WRONG_DERIVATIVE: c_int = 106;
+pub(crate) const PRINT: c_int = 107;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Mode {
@@ -206,6 +207,7 @@ impl Instance {
             }
             OK => {}
             ROUND_DOWN => round_down(),
+            PRINT => println!("a line"),
             TOO_LARGE | NO_DERIVATIVE | WRONG_DERIVATIVE => {}
             ABORT => {
                 eprintln!("the last words");
