@@ -105,3 +105,30 @@ fn a_component_that_asks_for_the_end_is_heard() {
         }
     }
 }
+
+#[test]
+fn a_component_that_cannot_write_its_state_keeps_no_checkpoints() {
+    let text = "[components.a]\nfmu = \"A\"\n";
+    for (attributes, is_kept) in [
+        ("", false),
+        (r#"canGetAndSetFMUState="true""#, false),
+        (
+            r#"canGetAndSetFMUState="true" canSerializeFMUState="true""#,
+            true,
+        ),
+    ] {
+        let fmu = stepped(FmiVersion::V3, attributes, "");
+        let plan = Plan::fixed(STEP, 1.0);
+        let mut own = planned(
+            text,
+            &mut named(vec![("A", fmu)]),
+            &Samples::none(STEP),
+            &plan,
+        );
+        let kept = own.keep_checkpoints(1, Box::new(|_, _| Ok(())));
+        assert_eq!(kept.is_ok(), is_kept);
+        if let Err(error) = kept {
+            assert!(error.to_string().contains("`a`"), "{error}");
+        }
+    }
+}

@@ -182,3 +182,122 @@ fn a_table_is_followed_as_it_is_between_its_rows() {
         assert!(y.iter().zip(&expected).all(same), "{between:?}: {y:?}");
     }
 }
+
+#[test]
+fn arrays_and_exact_values_of_several_types_are_set_as_a_whole() {
+    let source = own(
+        r#"<Float64 name="first" valueReference="1" causality="output" initial="exact" start="0"/>
+        <Float64 name="a" valueReference="2" causality="output" initial="exact" start="0 0 0"><Dimension start="3"/>
+        </Float64>
+        <Int64 name="l" valueReference="3" causality="output" initial="exact" start="0"/>
+        <UInt64 name="m" valueReference="4" causality="output" initial="exact" start="0"/>
+        <Int64 name="n" valueReference="5" causality="output" initial="exact" start="0"/>"#,
+        "",
+        false,
+        &[0.0],
+        |_, _, _, count, y| {
+            count[0] += 1.0;
+            for (y, factor) in y.iter_mut().zip([1.0, 10.0, 20.0, 30.0, -5.0, 6.0, -7.0]) {
+                *y = factor * count[0];
+            }
+        },
+    );
+    let sink = own(
+        r#"<Float64 name="before" valueReference="1" causality="input" start="0"/>
+        <Float64 name="a" valueReference="2" causality="input" start="0 0 0"><Dimension start="3"/></Float64>
+        <Int64 name="n" valueReference="3" causality="input" start="0"/>
+        <UInt64 name="m" valueReference="4" causality="input" start="0"/>
+        <Int64 name="l" valueReference="5" causality="input" start="0"/>
+        <Float64 name="seen" valueReference="7" causality="output" initial="exact" start="0 0 0 0 0 0 0"><Dimension
+        start="7"/></Float64>"#,
+        "",
+        true,
+        &[],
+        |_, _, u, _, y| y.copy_from_slice(u),
+    );
+    let text = r#"connections = ["source.first -> sink.before", "source.a -> sink.a", "source.l -> sink.l",
+        "source.m -> sink.m", "source.n -> sink.n"]
+        [components.source]
+        fmu = "Source"
+        [components.sink]
+        fmu = "Sink"
+        period = "0.1 s"
+        "#;
+    let mut parts = named(vec![("Source", source), ("Sink", sink)]);
+    let plan = Plan::fixed(STEP, 0.4);
+    let outcome = run(text, &mut parts, &Samples::none(STEP), &plan, 4);
+    assert!(outcome.ended.is_regular(), "{}", outcome.ended.message());
+    for n in 0..4 {
+        let count = n as f64;
+        let seen: Vec<f64> = (1..=7)
+            .map(|at| outcome.record.column(&format!("sink.seen[{at}]")).unwrap()[n])
+            .collect();
+        let expected = [1.0, 10.0, 20.0, 30.0, -7.0, 6.0, -5.0];
+        assert_eq!(seen, expected.map(|factor| factor * count));
+    }
+    // Each trivial step takes less than this by far.
+    let names: Vec<&str> = outcome
+        .spent
+        .iter()
+        .map(|(name, _)| name.as_str())
+        .collect();
+    assert_eq!(names, ["sink", "source"]);
+    assert!(
+        outcome
+            .spent
+            .iter()
+            .all(|(_, time)| (0.0..0.5).contains(time))
+    );
+}
+
+/// A controller that fails at its fourth call, and a guard that trips a call after it is told to.
+#[test]
+fn a_sampled_component_that_fails_is_followed_by_the_guard() {
+    let law = own(
+        r#"<Float64 name="y" valueReference="1" causality="output" initial="exact" start="0"/>"#,
+        "",
+        true,
+        &[0.0],
+        |_, _, _, count, y| {
+            count[0] += 1.0;
+            y[0] = if count[0] > 3.0 {
+                f64::NAN
+            } else {
+                10.0 * count[0]
+            };
+        },
+    );
+    let guard = own(
+        r#"<Boolean name="stop" valueReference="1" causality="input" start="false"/>
+        <Boolean name="tripped" valueReference="2" causality="output" initial="exact" start="false"/>"#,
+        "",
+        true,
+        &[],
+        |_, _, u, _, y| y[0] = u[0],
+    );
+    let text = |more: &str| {
+        format!(
+            "[experiment]\nend_when = \"guard.tripped\"\n{more}[components.law]\nfmu = \"Law\"\n\
+            period = \"0.1 s\"\n[components.guard]\nfmu = \"Guard\"\nperiod = \"0.1 s\"\n"
+        )
+    };
+    let mut parts = named(vec![("Law", law), ("Guard", guard)]);
+    let plan = Plan::fixed(STEP, 2.0);
+    let mut of = |more: &str| run(&text(more), &mut parts, &Samples::none(STEP), &plan, 20);
+    let outcome = of("stop = \"guard.stop\"\n");
+    let Ended::Stopped { error, time } = &outcome.ended else {
+        panic!("{:?}", outcome.ended);
+    };
+    assert!(error.to_string().contains("has no value") && (time - 0.4).abs() < 1e-12);
+    // Its output keeps the value of the last call that went well.
+    let [law, guard] = ["law.y", "guard.tripped"].map(|name| outcome.record.column(name).unwrap());
+    assert_eq!(law, [10.0, 20.0, 30.0, 30.0, 30.0]);
+    assert_eq!(guard, [0.0, 0.0, 0.0, 0.0, 1.0]);
+    // Without a guard the run ends there.
+    let outcome = of("");
+    assert_eq!(
+        (outcome.ended.kind(), outcome.record.len()),
+        (Ending::Failed, 3)
+    );
+    assert!(outcome.ended.message().contains("has no value"));
+}

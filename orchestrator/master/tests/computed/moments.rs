@@ -269,6 +269,8 @@ fn a_component_that_fails_is_reported_to_whoever_moves_it() {
 }
 
 const SCALED: &str = r#"<Float64 name="gain" valueReference="1" causality="parameter" variability="tunable" start="3"/>
+<Float64 name="bias" valueReference="4" causality="parameter" variability="tunable" start="3"/>
+<Int32 name="whole" valueReference="5" causality="parameter" variability="tunable" start="3"/>
 <Float64 name="fixed" valueReference="2" causality="parameter" variability="fixed" start="3"/>
 <Float64 name="y" valueReference="3" causality="output" initial="exact" start="0"/>"#;
 
@@ -293,14 +295,18 @@ fn a_parameter_moves_along_its_line_and_the_run_can_be_repeated() {
         low: 0.0,
         high: 10.0,
     };
-    let panel = Arc::new(Panel::new(vec![tunable("part.gain")], 4));
+    let all = vec![tunable("part.bias"), tunable("part.gain")];
+    let panel = Arc::new(Panel::new(all, 4));
+    assert_eq!((panel.samples(), panel.tunables().len()), (4, 2));
+    assert_eq!(Panel::new(Vec::new(), 0).samples(), 1);
     let mut first = fresh();
     first.tune(panel.clone()).unwrap();
     assert_eq!(panel.ask("part.gain", 5.0), Ok(5.0));
     let outcome = first.run(10, Pace::Fastest, &mut |_| {});
     let gain = outcome.record.column("part.gain").unwrap();
     assert_eq!(gain, [3.0, 3.5, 4.0, 4.5, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0]);
-    assert_eq!(panel.values(), [5.0]);
+    assert_eq!(outcome.record.column("part.bias"), None);
+    assert_eq!(panel.values(), [3.0, 5.0]);
     assert_eq!(panel.changes(), outcome.changes);
     let [change] = &outcome.changes[..] else {
         panic!("{:?}", outcome.changes);
@@ -314,14 +320,19 @@ fn a_parameter_moves_along_its_line_and_the_run_can_be_repeated() {
     let mut later = change.clone();
     later.sample = 7;
     let mut second = fresh();
-    second.repeat(&[later]).unwrap();
+    let mut other = later.clone();
+    (other.variable, other.sample) = ("part.bias".to_string(), 1);
+    second.repeat(&[later, other]).unwrap();
     let outcome = second.run(10, Pace::Fastest, &mut |_| {});
     let gain = outcome.record.column("part.gain").unwrap();
     assert_eq!(gain[6..], [3.0, 3.0, 3.5, 4.0]);
+    let bias = outcome.record.column("part.bias").unwrap();
+    assert_eq!(bias[..6], [3.0, 3.0, 3.5, 4.0, 4.5, 5.0]);
     for (name, reason) in [
         ("part.other", "no such parameter"),
         ("other.gain", "no such parameter"),
         ("part.fixed", "does not declare it as a tunable parameter"),
+        ("part.whole", "only single real numbers can be changed"),
     ] {
         let panel = Arc::new(Panel::new(vec![tunable(name)], 4));
         let refused = fresh().tune(panel).unwrap_err().to_string();

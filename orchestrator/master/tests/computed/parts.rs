@@ -156,7 +156,7 @@ pub fn run(text: &str, parts: &mut Parts, samples: &Samples, plan: &Plan, rows: 
 /// What a component does: time, step, inputs, own state and outputs.
 pub type Equations = fn(f64, f64, &[f64], &mut [f64], &mut [f64]);
 
-/// A component with numbers for its state.
+/// A component with numbers for its state; it fails where an output is not a number.
 struct Own {
     state: Vec<f64>,
     equations: Equations,
@@ -171,7 +171,10 @@ impl Behaviour for Own {
         outputs: &mut [f64],
     ) -> Result<(), BehaviourError> {
         (self.equations)(time, step, inputs, &mut self.state, outputs);
-        Ok(())
+        match outputs.iter().any(|value| value.is_nan()) {
+            true => Err("has no value".into()),
+            false => Ok(()),
+        }
     }
 
     fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
