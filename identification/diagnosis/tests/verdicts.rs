@@ -1,0 +1,239 @@
+//! Verdicts on a spring whose law is known: `y = k x` with effects added, under white noise of a known size.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use diagnosis::{
+    Candidate, EffectParameter, ExtensibleModel, Judgement, Lesson, Observer, Point, Role, Scale,
+    Verdict, judge,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const SAMPLES: usize = 2000;
+/// Root mean square of the noise.
+const NOISE: f64 = 0.05;
+/// The stiffness is stated as 1, known to this.
+const KNOWN_TO: f64 = 0.1;
+
+/// Motion of a record and its velocity.
+fn motion(record: usize, k: usize) -> [f64; 2] {
+    let t = k as f64 / 50.0;
+    let shift = record as f64;
+    let tones: [(f64, f64); 3] = [(1.3, 1.0), (3.7, 0.6), (7.9, 0.3)];
+    let of = |wave: fn(f64) -> f64, power: i32| -> f64 {
+        let all = tones.iter();
+        all.map(|(rate, size)| size * rate.powi(power) * wave(rate * t + shift * rate))
+            .sum()
+    };
+    [of(f64::sin, 0), of(f64::cos, 1)]
+}
+
+/// Forces that a spring may have beside its own: of its cube, of the velocity, of the velocity's sign, and a
+/// tone that the catalogue does not know.
+fn forces([x, v]: [f64; 2], k: usize) -> [f64; 4] {
+    [x * x * x, v, v.signum(), (0.43 * k as f64).sin()]
+}
+
+#[derive(Clone)]
+struct Spring {
+    candidates: Vec<Candidate>,
+    measured: Vec<Vec<f64>>,
+}
+
+impl Spring {
+    /// With these shares of the forces, in three records.
+    fn new(stiffness: f64, sizes: [f64; 4]) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(11);
+        let mut record = |record: usize| {
+            let mut uniform = || random.random_range(-0.5..0.5);
+            // Sums of twelve are nearly normal; of unit power here.
+            let noise: Vec<f64> = (0..SAMPLES)
+                .map(|_| (0..12).map(|_| uniform()).sum())
+                .collect();
+            let power = noise.iter().map(|one| one * one).sum::<f64>() / SAMPLES as f64;
+            let all = noise.iter().enumerate().map(|(k, noise)| {
+                let own = motion(record, k);
+                let extra = forces(own, k).into_iter().zip(sizes);
+                let extra: f64 = extra.map(|(force, size)| size * force).sum();
+                stiffness * own[0] + extra + NOISE * noise / power.sqrt()
+            });
+            all.collect()
+        };
+        let candidate = |effect| {
+            let size = EffectParameter {
+                name: "size",
+                unit: "N",
+                scale: Scale::Linear(0.1),
+                role: Role::Size { weak: 0.1 },
+                bounds: (-3.0, 3.0),
+            };
+            Candidate::new(effect, vec![size], vec![vec![0.3], vec![-0.3]])
+        };
+        Self {
+            candidates: ["cubic", "viscous", "dry"].map(candidate).to_vec(),
+            measured: (0..3).map(&mut record).collect(),
+        }
+    }
+}
+
+impl ExtensibleModel for Spring {
+    type Predictor = ();
+
+    fn nuisance(&self) -> usize {
+        1
+    }
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+    fn records(&self) -> usize {
+        self.measured.len()
+    }
+    fn record_name(&self, record: usize) -> &str {
+        ["first", "second", "third"][record]
+    }
+    fn channels(&self) -> &[&'static str] {
+        &["force"]
+    }
+    fn regressors(&self, record: usize) -> Vec<(String, Vec<f64>)> {
+        let names = ["cube", "velocity", "direction"].into_iter().enumerate();
+        names
+            .map(|(at, name)| {
+                let values = (0..SAMPLES).map(|k| forces(motion(record, k), k)[at]);
+                (name.to_string(), values.collect())
+            })
+            .collect()
+    }
+    fn with_learned_noise(&self, _: &Point, _: &[f64], _: &[usize]) -> Option<Lesson<Self>> {
+        None
+    }
+    fn quiet_records(&self, _: &[usize]) -> Vec<usize> {
+        Vec::new()
+    }
+    fn residual_count(&self, record: usize) -> usize {
+        self.measured[record].len()
+    }
+    fn sample_count(&self, record: usize) -> usize {
+        self.measured[record].len()
+    }
+    fn predictor(&self, _: &Point) -> Option<()> {
+        Some(())
+    }
+    fn log_determinant(&self, _: &()) -> f64 {
+        2.0 * NOISE.ln()
+    }
+    fn residuals(&self, _: &(), point: &Point, record: usize, out: &mut [f64]) -> bool {
+        let stiffness = 1.0 + KNOWN_TO * point.nuisance[0];
+        for (k, (out, measured)) in out.iter_mut().zip(&self.measured[record]).enumerate() {
+            let own = motion(record, k);
+            let forces = forces(own, k);
+            let effects = point.effects.iter();
+            let extra: f64 = effects.map(|(i, q)| 0.1 * q[0] * forces[*i]).sum();
+            *out = (measured - stiffness * own[0] - extra) / NOISE;
+        }
+        out.iter().all(|value| value.is_finite())
+    }
+}
+
+/// Two records are fitted, the third is kept to predict.
+fn judged(stiffness: f64, sizes: [f64; 4]) -> Judgement {
+    let mut spring = Spring::new(stiffness, sizes);
+    judge(&mut spring, &[0, 1], &[2], Observer::none()).unwrap()
+}
+
+/// Names and sizes of effects, in the order of their names.
+fn sizes(judgement: &Judgement) -> Vec<(&'static str, f64, f64)> {
+    let effects = judgement.effects.iter();
+    let mut all: Vec<_> = effects
+        .map(|own| {
+            (
+                own.effect,
+                own.parameters[0].value,
+                own.parameters[0].standard_error,
+            )
+        })
+        .collect();
+    all.sort_by_key(|own| own.0);
+    all
+}
+
+#[test]
+fn a_spring_without_more_is_adequate_and_its_stiffness_is_found() {
+    let found = judged(1.05, [0.0; 4]);
+    assert_eq!(found.verdict, Verdict::Adequate);
+    assert!(found.effects.is_empty() && found.unseen_gains.is_empty());
+    // In stated standard deviations of 0.1.
+    let (own, error) = (found.nominal.nuisance[0], found.nuisance_errors[0]);
+    assert!(
+        (own - 0.5).abs() < 5.0 * error && error > 0.0,
+        "{own} {error}"
+    );
+    let squares: f64 = (0..2 * SAMPLES)
+        .map(|k| motion(k / SAMPLES, k % SAMPLES)[0].powi(2))
+        .sum();
+    let expected = NOISE / KNOWN_TO / squares.sqrt();
+    assert!((error / expected - 1.0).abs() < 0.3, "{error} {expected}");
+}
+
+#[test]
+fn an_effect_is_named_with_its_size_and_predicts_what_was_not_fitted() {
+    for (at, effect, size) in [(0, "cubic", 0.4), (1, "viscous", -0.3), (2, "dry", 0.5)] {
+        let mut hidden = [0.0; 4];
+        hidden[at] = size;
+        let found = judged(0.97, hidden);
+        assert_eq!(found.verdict, Verdict::Named, "{effect}");
+        let all = sizes(&found);
+        let [(name, value, error)] = all[..] else {
+            panic!("{all:?}");
+        };
+        assert_eq!(name, effect);
+        assert!((value - size).abs() < 5.0 * error, "{value} {error}");
+        assert!(error > 0.0 && error < 0.05 * size.abs(), "{value} {error}");
+        assert!(found.share_explained > 0.99, "{}", found.share_explained);
+        assert!(found.alternatives.is_empty());
+        assert!(
+            found.unseen_gains[0].unwrap() > 5.0,
+            "{:?}",
+            found.unseen_gains
+        );
+        assert!(found.without[0].as_ref().unwrap().effects.is_empty());
+        assert!(found.effects[0].confidence > 0.9);
+    }
+}
+
+#[test]
+fn two_effects_are_found_together_and_a_third_is_not_invented() {
+    let found = judged(1.0, [0.4, 0.0, -0.5, 0.0]);
+    assert_eq!(found.verdict, Verdict::Named);
+    let all = sizes(&found);
+    let [(first, cubic, _), (second, dry, _)] = all[..] else {
+        panic!("{all:?}");
+    };
+    assert_eq!((first, second), ("cubic", "dry"));
+    assert!(
+        (cubic - 0.4).abs() < 0.02 && (dry + 0.5).abs() < 0.02,
+        "{all:?}"
+    );
+    assert_eq!(found.unseen_gains.len(), 2);
+}
+
+#[test]
+fn a_weak_effect_is_too_small_and_a_stranger_is_unexplained() {
+    // Six hundredths are the least that matters; this much hardly shows over the noise.
+    let found = judged(1.0, [0.0, 0.0, 0.008, 0.0]);
+    assert_eq!(found.verdict, Verdict::TooSmall);
+    let all = sizes(&found);
+    assert!(
+        all.len() == 1 && all[0].0 == "dry" && (all[0].1 - 0.008).abs() < 5.0 * all[0].2,
+        "{all:?}"
+    );
+    let found = judged(1.0, [0.0, 0.0, 0.0, 0.5]);
+    assert_eq!(found.verdict, Verdict::Unexplained);
+    let strongest = &found.tests[0];
+    assert!(strongest.deviate > 10.0, "{strongest:?}");
+    // With an effect beside it, that one is ranked.
+    let found = judged(1.0, [0.8, 0.0, 0.0, 0.2]);
+    assert_eq!(found.verdict, Verdict::Unexplained);
+    let first = &found.candidates[0].effects;
+    assert!(first.iter().any(|own| own.effect == "cubic"), "{first:?}");
+    assert!(found.share_explained > 0.9 && found.share_explained < 1.0);
+}
