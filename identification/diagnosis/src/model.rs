@@ -153,7 +153,7 @@ impl Scale {
             Self::Linear(unit) => unit,
             Self::Factor(unit) => unit * (internal * unit).exp(),
             Self::Logarithmic => internal.exp(),
-            Self::Inverse(unit) => unit / (internal * internal),
+            Self::Inverse(unit) => -unit / (internal * internal),
         }
     }
 }
@@ -372,6 +372,31 @@ mod tests {
             }],
             Vec::new(),
         )
+    }
+
+    #[test]
+    fn values_and_coordinates_are_each_other_s_inverse_on_every_scale() {
+        for (scale, value, internal) in [
+            (Scale::Linear(2.0), 3.0, 1.5),
+            (Scale::Factor(0.5), 0.25, 2.0 * 1.25_f64.ln()),
+            (Scale::Logarithmic, 3.0, 3.0_f64.ln()),
+            (Scale::Inverse(6.0), 3.0, 2.0),
+        ] {
+            let own = candidate((0.0, 10.0), scale);
+            let [found] = own.internal(&[value])[..] else {
+                panic!("one coordinate");
+            };
+            assert!((found - internal).abs() < 1e-12, "{scale:?}");
+            let back = own.values(&[found]);
+            assert!(back.len() == 1 && (back[0] - value).abs() < 1e-12);
+            // The slope by a small difference.
+            let step = 1e-6;
+            let rise = scale.to_value(found + step) - scale.to_value(found - step);
+            assert!(
+                (rise / (2.0 * step) - scale.slope(found)).abs() < 1e-6,
+                "{scale:?}"
+            );
+        }
     }
 
     #[test]
