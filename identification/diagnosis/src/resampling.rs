@@ -189,6 +189,22 @@ mod tests {
         assert!(low < 0.5 && 0.5 < high && high - low < 0.1, "{low} {high}");
     }
 
+    /// Means of any parts of a steady series are those of all of it, whatever the blocks cover.
+    #[test]
+    fn an_interval_of_steady_means_is_their_statistic() {
+        for samples in [5, 37, 1000, 1999] {
+            let sums = [3.0, 8.0].map(|value| running(std::iter::repeat_n(value, samples)));
+            let [low, high] = bootstrap([&sums[0], &sums[1]], |[a, b]| b - 2.0 * a);
+            assert!(
+                (low - 2.0).abs() < 1e-9 && (high - 2.0).abs() < 1e-9,
+                "{samples}"
+            );
+        }
+        let few = running([1.0, 2.0, 3.0].into_iter());
+        assert_eq!(few, [0.0, 1.0, 3.0, 6.0]);
+        assert_eq!(bootstrap([&few], |[mean]| mean), [0.0, 0.0]);
+    }
+
     #[test]
     fn interval_holds_the_share_of_a_steady_gain() {
         let sums = |size: f64| -> Vec<f64> {

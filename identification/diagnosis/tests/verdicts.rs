@@ -4,7 +4,7 @@
 
 use diagnosis::{
     Candidate, EffectParameter, ExtensibleModel, Judgement, Lesson, Observer, Point, Role, Scale,
-    Verdict, judge,
+    Selected, SimulatedModel, Verdict, judge, nominal, select,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -32,6 +32,15 @@ fn motion(record: usize, k: usize) -> [f64; 2] {
 /// tone that the catalogue does not know.
 fn forces([x, v]: [f64; 2], k: usize) -> [f64; 4] {
     [x * x * x, v, v.signum(), (0.43 * k as f64).sin()]
+}
+
+/// The force at a point of the model.
+fn force(point: &Point, record: usize, k: usize) -> f64 {
+    let own = motion(record, k);
+    let forces = forces(own, k);
+    let effects = point.effects.iter();
+    let extra: f64 = effects.map(|(i, q)| 0.1 * q[0] * forces[*i]).sum();
+    (1.0 + KNOWN_TO * point.nuisance[0]) * own[0] + extra
 }
 
 #[derive(Clone)]
@@ -122,13 +131,8 @@ impl ExtensibleModel for Spring {
         2.0 * NOISE.ln()
     }
     fn residuals(&self, _: &(), point: &Point, record: usize, out: &mut [f64]) -> bool {
-        let stiffness = 1.0 + KNOWN_TO * point.nuisance[0];
         for (k, (out, measured)) in out.iter_mut().zip(&self.measured[record]).enumerate() {
-            let own = motion(record, k);
-            let forces = forces(own, k);
-            let effects = point.effects.iter();
-            let extra: f64 = effects.map(|(i, q)| 0.1 * q[0] * forces[*i]).sum();
-            *out = (measured - stiffness * own[0] - extra) / NOISE;
+            *out = (measured - force(point, record, k)) / NOISE;
         }
         out.iter().all(|value| value.is_finite())
     }
@@ -236,4 +240,101 @@ fn a_weak_effect_is_too_small_and_a_stranger_is_unexplained() {
     let first = &found.candidates[0].effects;
     assert!(first.iter().any(|own| own.effect == "cubic"), "{first:?}");
     assert!(found.share_explained > 0.9 && found.share_explained < 1.0);
+}
+
+/// The same spring by simulation: a record of both halves of the first (2), and these (0 and 1).
+impl SimulatedModel for Spring {
+    fn nuisance(&self) -> usize {
+        1
+    }
+    fn candidates(&self) -> &[Candidate] {
+        &self.candidates
+    }
+    fn blocks(&self) -> usize {
+        1
+    }
+    fn block_of(&self, _: usize) -> Option<usize> {
+        None
+    }
+    fn samples(&self, record: usize, _: usize) -> usize {
+        if record == 2 { SAMPLES } else { SAMPLES / 2 }
+    }
+    fn errors(&self, point: &Point, record: usize, _: usize) -> Vec<f64> {
+        let half = SAMPLES / 2;
+        let part = match record {
+            0 => 0..half,
+            1 => half..SAMPLES,
+            _ => 0..SAMPLES,
+        };
+        part.map(|k| self.measured[0][k] - force(point, 0, k))
+            .collect()
+    }
+    fn folds(&self, _: usize) -> [usize; 2] {
+        [0, 1]
+    }
+    fn screen(&self, record: usize) -> usize {
+        record
+    }
+    fn held(&self) -> Self {
+        self.clone()
+    }
+    fn record_name(&self, _: usize) -> &str {
+        "first"
+    }
+}
+
+fn selected(stiffness: f64, sizes: [f64; 4]) -> Selected {
+    select(&Spring::new(stiffness, sizes), 2, Observer::none()).unwrap()
+}
+
+#[test]
+fn effects_that_help_on_the_other_half_are_selected_with_their_sizes() {
+    let found = selected(1.05, [0.4, 0.0, -0.5, 0.0]);
+    let mut effects = found.extended.point.effects.clone();
+    effects.sort_by_key(|own| own.0);
+    let [(0, cubic), (2, dry)] = &effects[..] else {
+        panic!("{effects:?}");
+    };
+    // Tenths of a newton.
+    assert!(
+        (cubic[0] - 4.0).abs() < 0.2 && (dry[0] + 5.0).abs() < 0.2,
+        "{effects:?}"
+    );
+    assert!((found.extended.point.nuisance[0] - 0.5).abs() < 0.1);
+    // Only the noise is left, of which three coordinates take a little.
+    let noise = NOISE * NOISE * SAMPLES as f64;
+    let left = found.extended.squares / noise;
+    assert!((0.98..1.0).contains(&left), "{left}");
+    assert!(found.nominal.squares > 20.0 * noise);
+    assert_eq!((found.deviates.len(), found.without.len()), (2, 2));
+    assert!(
+        found.deviates.iter().all(|deviate| *deviate > 4.0),
+        "{:?}",
+        found.deviates
+    );
+    for without in &found.without {
+        assert_eq!(without.point.effects.len(), 1);
+        assert!(without.squares > 2.0 * noise && without.squares < found.nominal.squares);
+    }
+    assert!(found.rivals.is_empty());
+    // By the noise over the root of what each moves.
+    assert_eq!(found.deviations.len(), 3);
+    assert!(
+        found.deviations.iter().all(|own| (1e-3..0.2).contains(own)),
+        "{:?}",
+        found.deviations
+    );
+}
+
+#[test]
+fn nothing_is_selected_of_noise_and_the_nominal_model_is_refitted() {
+    let found = selected(0.9, [0.0; 4]);
+    assert!(found.extended.point.effects.is_empty() && found.without.is_empty());
+    let spring = Spring::new(0.9, [0.0; 4]);
+    let alone = nominal(&spring, 2).unwrap();
+    for own in [&alone, &found.nominal] {
+        assert!((own.point.nuisance[0] + 1.0).abs() < 0.1, "{:?}", own.point);
+        let left = own.squares / (NOISE * NOISE * SAMPLES as f64);
+        assert!((0.99..1.0).contains(&left), "{left}");
+    }
 }
