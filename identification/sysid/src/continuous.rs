@@ -172,6 +172,11 @@ mod tests {
         let output: Vec<f64> = (0..5000).map(|k| wave(h * k as f64 - delay)).collect();
         let got = delay_by_correlation(&input, &output, h, 0.05);
         assert!((got - delay).abs() < 1e-4, "{got}");
+        for delay in [0.0122, 0.0144] {
+            let output: Vec<f64> = (0..5000).map(|k| wave(h * k as f64 - delay)).collect();
+            let got = delay_by_correlation(&input, &output, h, 0.05);
+            assert!((got - delay).abs() < 1e-4, "{got}");
+        }
         // A drift that is much larger than the signals does not hide it.
         let drifting = |values: &[f64], rate: f64| -> Vec<f64> {
             let all = values.iter().enumerate();

@@ -444,4 +444,12 @@ fn two_experiments_give_one_transfer_function_and_an_offset_each() {
         let error: f64 = value / expected - 1.0;
         assert!(error.abs() < 0.01, "{found:?}");
     }
+    // What is known is taken from both before the rest is fitted.
+    for (power, value) in [(0, 100.0), (1, 4.0)] {
+        let given = regress(&signals, &[vec![1, 0]], PERIOD, &filter, &[(power, value)]).unwrap();
+        assert_eq!(given.denominator[2 - power], value);
+        let rest = given.denominator[1 + power] / [4.0, 100.0][power] - 1.0;
+        let gain = given.numerators[0][1] / 100.0 - 1.0;
+        assert!(rest.abs() < 0.01 && gain.abs() < 0.01, "{given:?}");
+    }
 }
