@@ -39,7 +39,11 @@ fn force(point: &Point, record: usize, k: usize) -> f64 {
     let own = motion(record, k);
     let forces = forces(own, k);
     let effects = point.effects.iter();
-    let extra: f64 = effects.map(|(i, q)| 0.1 * q[0] * forces[*i]).sum();
+    let of_effect = |(i, q): &(usize, Vec<f64>)| match q[..] {
+        [size, range] => 0.1 * size * (own[1] / range).tanh(),
+        _ => 0.1 * q[0] * forces[*i],
+    };
+    let extra: f64 = effects.map(of_effect).sum();
     (1.0 + KNOWN_TO * point.nuisance[0]) * own[0] + extra
 }
 
@@ -52,6 +56,15 @@ struct Spring {
 impl Spring {
     /// With these shares of the forces, in three records.
     fn new(stiffness: f64, sizes: [f64; 4]) -> Self {
+        Self::of(&|own, k| {
+            let extra = forces(own, k).into_iter().zip(sizes);
+            let extra: f64 = extra.map(|(force, size)| size * force).sum();
+            stiffness * own[0] + extra
+        })
+    }
+
+    /// With this force at a motion and a sample.
+    fn of(force: &dyn Fn([f64; 2], usize) -> f64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(11);
         let mut record = |record: usize| {
             let mut uniform = || random.random_range(-0.5..0.5);
@@ -60,12 +73,10 @@ impl Spring {
                 .map(|_| (0..12).map(|_| uniform()).sum())
                 .collect();
             let power = noise.iter().map(|one| one * one).sum::<f64>() / SAMPLES as f64;
-            let all = noise.iter().enumerate().map(|(k, noise)| {
-                let own = motion(record, k);
-                let extra = forces(own, k).into_iter().zip(sizes);
-                let extra: f64 = extra.map(|(force, size)| size * force).sum();
-                stiffness * own[0] + extra + NOISE * noise / power.sqrt()
-            });
+            let all = noise
+                .iter()
+                .enumerate()
+                .map(|(k, noise)| force(motion(record, k), k) + NOISE * noise / power.sqrt());
             all.collect()
         };
         let candidate = |effect| {
@@ -78,8 +89,24 @@ impl Spring {
             };
             Candidate::new(effect, vec![size], vec![vec![0.3], vec![-0.3]])
         };
+        let mut candidates = ["cubic", "viscous", "dry"].map(candidate).to_vec();
+        // Dry friction that turns over a range of velocity.
+        let mut smooth = candidates[2].clone();
+        smooth.parameters.push(EffectParameter {
+            name: "range",
+            unit: "m/s",
+            scale: Scale::Linear(1.0),
+            role: Role::Shape {
+                typical: 1.0,
+                spread: 2.0,
+            },
+            bounds: (0.05, 8.0),
+        });
+        smooth.starts = vec![vec![0.3, 1.0], vec![-0.3, 4.0]];
+        (smooth.effect, smooth.contains) = ("smooth", Some("dry"));
+        candidates.push(smooth);
         Self {
-            candidates: ["cubic", "viscous", "dry"].map(candidate).to_vec(),
+            candidates,
             measured: (0..3).map(&mut record).collect(),
         }
     }
@@ -221,6 +248,31 @@ fn two_effects_are_found_together_and_a_third_is_not_invented() {
 }
 
 #[test]
+fn the_general_case_of_an_effect_is_asked_for_where_the_special_one_leaves_traces() {
+    let mut spring = Spring::of(&|[x, v], _| x + 0.5 * (v / 0.7).tanh());
+    let found = judge(&mut spring, &[0, 1], &[2], Observer::none()).unwrap();
+    assert_eq!(found.verdict, Verdict::Named);
+    // Two starts lead to it, which are not each other's rivals.
+    assert!(found.alternatives.is_empty() && found.effects[0].confidence > 0.9);
+    let [effect] = &found.effects[..] else {
+        panic!("{:?}", found.effects);
+    };
+    assert_eq!(effect.effect, "smooth");
+    let parameters = effect
+        .parameters
+        .iter()
+        .zip([("size", 0.5), ("range", 0.7)]);
+    for (own, (name, truth)) in parameters {
+        assert_eq!((own.name.as_str(), own.is_shape), (name, name == "range"));
+        assert!(
+            (own.value - truth).abs() < 5.0 * own.standard_error,
+            "{own:?}"
+        );
+        assert!(own.standard_error < 0.1 * truth, "{own:?}");
+    }
+}
+
+#[test]
 fn a_weak_effect_is_too_small_and_a_stranger_is_unexplained() {
     // Six hundredths are the least that matters; this much hardly shows over the noise.
     let found = judged(1.0, [0.0, 0.0, 0.008, 0.0]);
@@ -295,7 +347,10 @@ impl SimulatedModel for Spring {
 }
 
 fn selected(stiffness: f64, sizes: [f64; 4]) -> Selected {
-    select(&Spring::new(stiffness, sizes), 2, Observer::none()).unwrap()
+    let mut spring = Spring::new(stiffness, sizes);
+    // Without what holds another as a special case.
+    spring.candidates.truncate(3);
+    select(&spring, 2, Observer::none()).unwrap()
 }
 
 #[test]
