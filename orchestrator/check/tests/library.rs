@@ -41,15 +41,7 @@ fn checked(version: FmiVersion, answer: i32, attributes: &str, more: &[(&str, &s
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("Minimal.fmu");
     let description = made::description(version, [Some(attributes), None], "");
-    let token = format!("minimal {answer}");
-    let description = ["guid", "instantiationToken"]
-        .iter()
-        .fold(description, |text, name| {
-            text.replace(
-                &format!(r#"{name}="minimal""#),
-                &format!(r#"{name}="{token}""#),
-            )
-        });
+    let description = made::answering(&description, answer);
     made::pack(&path, &description, made::library(), more);
     let guest = std::env::current_exe().unwrap();
     validate(&path, Some(&guest)).unwrap()

@@ -167,6 +167,7 @@ fn the_gain_is_the_real_eigenvalue_next_to_one() {
     let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9;
     // Eigenvalues 0.2 and 1.5; then 4 and -1.
     assert!(near(of(&[0.2, 7.0, 0.0, 1.5]), 1.5));
+    assert!(near(of(&[1.5, 7.0, 0.0, 0.2]), 1.5));
     assert!(near(of(&[1.0, 2.0, 3.0, 2.0]), -1.0));
     // A rotation has none that is real.
     assert_eq!(of(&[0.0, -1.0, 1.0, 0.0]), None);

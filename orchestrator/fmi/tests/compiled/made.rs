@@ -164,6 +164,16 @@ pub fn exchanged(version: FmiVersion, attributes: &str) -> Arc<Fmu> {
     minimal(both).for_model_exchange().unwrap()
 }
 
+/// The same description, of an FMU that answers so from its beginning.
+pub fn answering(description: &str, answer: i32) -> String {
+    ["guid", "instantiationToken"]
+        .iter()
+        .fold(description.to_string(), |text, name| {
+            let token = format!(r#"{name}="minimal {answer}""#);
+            text.replace(&format!(r#"{name}="minimal""#), &token)
+        })
+}
+
 /// How an FMU is run whose calls are logged.
 pub fn logged() -> Options {
     Options {

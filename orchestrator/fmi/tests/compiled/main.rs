@@ -5,5 +5,6 @@
 mod co_simulation;
 mod events;
 mod exchange;
+#[allow(dead_code, reason = "tests of other crates need more")]
 mod made;
 mod values;

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use fmi_import::{FmiVersion, Fmu};
-use fmi_master::{Algorithm, Ending, Plan, Samples};
+use fmi_import::{FmiVersion, Fmu, Options};
+use fmi_master::{Algorithm, Ending, Pace, Plan, Samples, Simulation};
+use fmi_system::{Between, InputTable, SystemFile, assemble};
 
-use crate::made::{BOTH, exchanged, stepped};
+use crate::made::{BOTH, answering, description, exchanged, library, packed, stepped};
 use crate::parts::{STEP, named, planned, run};
 
 const VARIABLE: &str = r#"canHandleVariableCommunicationStepSize="true""#;
@@ -53,15 +54,14 @@ fn a_loop_without_a_solution_names_its_round_and_why() {
     // a = 2 b, b = 2 (0.25 a + 1): b = b + 2.
     let text = TOGETHER.replace("0.3", "0.25");
     let fmu = stepped(FmiVersion::V3, VARIABLE, "");
-    let file = fmi_system::SystemFile::parse("loop", &text).unwrap();
-    let system = fmi_system::assemble(&file, &[], &mut named(pair(&fmu))).unwrap();
-    let options = fmi_import::Options::default();
-    let made =
-        fmi_master::Simulation::planned(&system, &Samples::none(STEP), &iterative(), &options);
+    let file = SystemFile::parse("loop", &text).unwrap();
+    let system = assemble(&file, &[], &mut named(pair(&fmu))).unwrap();
+    let options = Options::default();
+    let made = Simulation::planned(&system, &Samples::none(STEP), &iterative(), &options);
     let said = match made {
         Err(error) => error.to_string(),
         Ok(own) => {
-            let outcome = own.run(3, fmi_master::Pace::Fastest, &mut |_| {});
+            let outcome = own.run(3, Pace::Fastest, &mut |_| {});
             outcome.ended.message()
         }
     };
@@ -89,7 +89,7 @@ fn a_component_that_asks_for_the_end_is_heard() {
             };
             let plan = Plan::fixed(STEP, 1.0);
             let outcome = planned(&text, &mut parts, &Samples::none(STEP), &plan);
-            let outcome = outcome.run(10, fmi_master::Pace::Fastest, &mut |_| {});
+            let outcome = outcome.run(10, Pace::Fastest, &mut |_| {});
             assert_eq!(
                 outcome.ended.kind(),
                 Ending::Terminated,
@@ -129,6 +129,65 @@ fn a_component_that_cannot_write_its_state_keeps_no_checkpoints() {
         assert_eq!(kept.is_ok(), is_kept);
         if let Err(error) = kept {
             assert!(error.to_string().contains("`a`"), "{error}");
+        }
+    }
+}
+
+/// `b.u` is `a.y`, which is declared to depend directly on `a.u`, a table that rises by 1 in a second.
+#[test]
+fn what_an_fmu_does_with_a_reading_after_a_setting_is_found_out() {
+    for (version, answer, note) in [
+        (FmiVersion::V2, 0, None),
+        (FmiVersion::V3, 0, None),
+        (
+            FmiVersion::V2,
+            108,
+            Some("computes it only in its steps: a delay of 100 ms is added"),
+        ),
+        (
+            FmiVersion::V3,
+            108,
+            Some("computes it only in its steps: a delay of 100 ms is added"),
+        ),
+        (
+            FmiVersion::V2,
+            109,
+            Some("`a` refuses to give outputs once inputs are set"),
+        ),
+    ] {
+        let described = description(version, [Some(VARIABLE), None], "");
+        let own = packed(&answering(&described, answer), library());
+        let all = vec![("A", own), ("B", stepped(version, VARIABLE, ""))];
+        let text = "connections = [\"load.force -> a.u\", \"a.y -> b.u\"]\n[components.a]\nfmu = \"A\"\n\
+            [components.b]\nfmu = \"B\"\n";
+        let mut file = SystemFile::parse("two", text).unwrap();
+        file.own_tables.push(InputTable {
+            name: "load".into(),
+            columns: vec!["force".into()],
+            units: vec![None],
+            times: vec![0.0, 2.0],
+            values: vec![vec![0.0, 2.0]],
+            between: Between::Linear,
+        });
+        let system = assemble(&file, &[], &mut named(all)).unwrap();
+        let plan = Plan::fixed(STEP, 1.0);
+        let made = Simulation::planned(&system, &Samples::none(STEP), &plan, &Options::default());
+        let outcome = made.unwrap().run(8, Pace::Fastest, &mut |_| {});
+        assert!(outcome.ended.is_regular(), "{}", outcome.ended.message());
+        let found = outcome
+            .notes
+            .iter()
+            .any(|own| note.is_some_and(|note| own.contains(note)));
+        assert_eq!(
+            (found, outcome.notes.len()),
+            (note.is_some(), usize::from(note.is_some()))
+        );
+        // Late by a step where it cannot be otherwise.
+        let y = outcome.record.column("a.y").unwrap();
+        let late = if note.is_some() { 1.0 } else { 0.0 };
+        for (n, y) in y.iter().enumerate().skip(1) {
+            let expected = 2.0 * STEP * (n as f64 - late);
+            assert!((y - expected).abs() < 1e-12, "{version} {answer} {n}: {y}");
         }
     }
 }

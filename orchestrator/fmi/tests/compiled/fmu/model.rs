@@ -31,6 +31,10 @@ pub(crate) const TOO_LARGE: c_int = 104;
 pub(crate) const NO_DERIVATIVE: c_int = 105;
 pub(crate) const WRONG_DERIVATIVE: c_int = 106;
 pub(crate) const PRINT: c_int = 107;
+/// Its output is that of the last step.
+pub(crate) const LATE: c_int = 108;
+/// It gives no outputs between a setting and the next step, which FMI 2.0 forbids (4.2.4).
+pub(crate) const REFUSES: c_int = 109;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Mode {
@@ -91,6 +95,9 @@ pub(crate) struct Instance {
     pub(crate) is_over: bool,
     pub(crate) is_reset: bool,
     pub(crate) is_ticked: bool,
+    /// The input at the last step, and whether it was set since.
+    pub(crate) stepped_with: f64,
+    pub(crate) is_set: bool,
     pub(crate) discarded_at: f64,
     pub(crate) log: Box<dyn Fn(c_int, &str)>,
 }
@@ -128,6 +135,8 @@ impl Instance {
             is_over: false,
             is_reset: false,
             is_ticked: false,
+            stepped_with: 0.0,
+            is_set: false,
             discarded_at: 0.0,
             log,
         }))
@@ -194,6 +203,7 @@ impl Instance {
         if self.mode != Stepping || !((time - self.now.time).abs() < 1e-9) || step <= 0.0 {
             return (ERROR, self.now.time, false);
         }
+        (self.stepped_with, self.is_set) = (self.now.u, false);
         let answer = if time >= self.now.fails {
             ERROR
         } else {
@@ -208,7 +218,7 @@ impl Instance {
             OK => {}
             ROUND_DOWN => round_down(),
             PRINT => println!("a line"),
-            TOO_LARGE | NO_DERIVATIVE | WRONG_DERIVATIVE => {}
+            TOO_LARGE | NO_DERIVATIVE | WRONG_DERIVATIVE | LATE | REFUSES => {}
             ABORT => {
                 eprintln!("the last words");
                 std::process::abort();
@@ -267,8 +277,16 @@ impl Instance {
         let mut at = 0;
         for &reference in references {
             let now = &self.now;
+            let u = if self.answer == LATE {
+                self.stepped_with
+            } else {
+                now.u
+            };
+            if self.answer == REFUSES && self.is_set {
+                return ERROR;
+            }
             let derived = match reference {
-                Y => vec![now.gain * now.u],
+                Y => vec![now.gain * u],
                 SLOPE => vec![-now.x],
                 TOLERANCE => vec![now.tolerance],
                 STOP => vec![now.stop],
@@ -287,6 +305,7 @@ impl Instance {
     }
 
     pub(crate) fn set_reals(&mut self, references: &[u32], values: &[f64]) -> c_int {
+        self.is_set = self.mode == Stepping;
         let mut at = 0;
         for &reference in references {
             let Some(own) = self.real(reference) else {
