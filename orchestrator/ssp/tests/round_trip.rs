@@ -11,7 +11,9 @@ use std::sync::Arc;
 
 use fmi_import::FmiVersion;
 use fmi_ssp::export::{Contents, Experiment, Player, Start, Supply, contents};
-use fmi_system::{Files, Hop, Passage, System, SystemFile, Transformation, Value, assemble};
+use fmi_system::{
+    Files, Hop, Passage, Setting, System, SystemFile, Transformation, Value, assemble,
+};
 use zip::{ZipWriter, write::SimpleFileOptions};
 
 fn zipped(path: &Path, files: &[(&str, &[u8])]) {
@@ -573,4 +575,78 @@ fn components_that_cannot_be_run_are_refused_with_their_reasons() {
     );
     let twice = of_text(&nested(1, "", &ALONE.repeat(2))).unwrap_err();
     assert!(twice.contains("two elements are called `a`"), "{twice}");
+}
+
+#[test]
+fn a_description_of_any_name_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("own.ssd");
+    std::fs::write(&path, nested(1, "", ALONE)).unwrap();
+    let other = folder.path().join("SystemStructure.ssd");
+    std::fs::write(other, nested(1, "", &ALONE.replace("\"a\"", "\"b\""))).unwrap();
+    let file = fmi_ssp::read(&path.to_string_lossy()).unwrap();
+    assert!(file.components.contains_key("a") && file.components.len() == 1);
+}
+
+#[test]
+fn values_of_a_system_reach_its_components_by_their_names() {
+    let set = |parameters: &[(&str, f64)]| -> String {
+        let all = parameters.iter().map(|(name, value)| {
+            format!(r#"<ssv:Parameter name="{name}"><ssv:Real value="{value}"/></ssv:Parameter>"#)
+        });
+        format!(
+            r#"<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0"
+            name="set"><ssv:Parameters>{}</ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues>
+            </ssd:ParameterBinding></ssd:ParameterBindings>"#,
+            all.collect::<String>()
+        )
+    };
+    let component = |name: &str, bindings: &str| {
+        format!(
+            r#"<ssd:Component name="{name}" source="a.fmu" type="application/x-fmu-sharedlibrary">{bindings}
+            </ssd:Component>"#
+        )
+    };
+    let inner = format!(
+        r#"<ssd:System name="inner">{}<ssd:Elements>{}{}</ssd:Elements></ssd:System>{}"#,
+        set(&[("a.k", 1.0), ("b.k", 2.0)]),
+        component("a", &set(&[("k", 3.0), ("c", 4.0)])),
+        component("b", ""),
+        component("a", ""),
+    );
+    let text = nested(1, "", &inner)
+        .replacen(
+            r#"<ssd:System name="s0">"#,
+            &format!(
+                r#"<ssd:System name="s0">{}"#,
+                set(&[("inner.b.k", 5.0), ("a.k", 6.0), ("inner.b.m", 7.0)])
+            ),
+            1,
+        )
+        .replace(
+            "<ssd:SystemStructureDescription ",
+            r#"<ssd:SystemStructureDescription xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" "#,
+        );
+    let file = of_text(&text).unwrap();
+    let given = |component: &str| -> Vec<(String, f64)> {
+        let all = file.components[component].parameters.iter();
+        let number = |setting: &Setting| match setting {
+            Setting::Number(value) => *value,
+            Setting::Declared(own) => match own.value {
+                Setting::Number(value) => value,
+                _ => f64::NAN,
+            },
+            _ => f64::NAN,
+        };
+        all.map(|(name, own)| (name.clone(), number(own))).collect()
+    };
+    let named = |all: &[(&str, f64)]| -> Vec<(String, f64)> {
+        all.iter()
+            .map(|(name, value)| ((*name).to_string(), *value))
+            .collect()
+    };
+    // Values of a higher system go before those of a lower one.
+    assert_eq!(given("inner.a"), named(&[("c", 4.0), ("k", 1.0)]));
+    assert_eq!(given("inner.b"), named(&[("k", 5.0), ("m", 7.0)]));
+    assert_eq!(given("a"), named(&[("k", 6.0)]));
 }
