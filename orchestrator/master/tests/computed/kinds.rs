@@ -185,6 +185,12 @@ fn a_table_is_followed_as_it_is_between_its_rows() {
 
 #[test]
 fn arrays_and_exact_values_of_several_types_are_set_as_a_whole() {
+    for is_sampled in [false, true] {
+        arrays_are_set(is_sampled);
+    }
+}
+
+fn arrays_are_set(is_sampled: bool) {
     let source = own(
         r#"<Float64 name="first" valueReference="1" causality="output" initial="exact" start="0"/>
         <Float64 name="a" valueReference="2" causality="output" initial="exact" start="0 0 0"><Dimension start="3"/>
@@ -193,7 +199,7 @@ fn arrays_and_exact_values_of_several_types_are_set_as_a_whole() {
         <UInt64 name="m" valueReference="4" causality="output" initial="exact" start="0"/>
         <Int64 name="n" valueReference="5" causality="output" initial="exact" start="0"/>"#,
         "",
-        false,
+        is_sampled,
         &[0.0],
         |_, _, _, count, y| {
             count[0] += 1.0;
@@ -215,20 +221,24 @@ fn arrays_and_exact_values_of_several_types_are_set_as_a_whole() {
         &[],
         |_, _, u, _, y| y.copy_from_slice(u),
     );
+    let period = if is_sampled { "period = 0.1" } else { "" };
     let text = r#"connections = ["source.first -> sink.before", "source.a -> sink.a", "source.l -> sink.l",
         "source.m -> sink.m", "source.n -> sink.n"]
         [components.source]
         fmu = "Source"
+        PERIOD
         [components.sink]
         fmu = "Sink"
         period = "0.1 s"
-        "#;
+        "#
+    .replace("PERIOD", period);
     let mut parts = named(vec![("Source", source), ("Sink", sink)]);
     let plan = Plan::fixed(STEP, 0.4);
-    let outcome = run(text, &mut parts, &Samples::none(STEP), &plan, 4);
+    let outcome = run(&text, &mut parts, &Samples::none(STEP), &plan, 4);
     assert!(outcome.ended.is_regular(), "{}", outcome.ended.message());
     for n in 0..4 {
-        let count = n as f64;
+        // A sampled one is called at a sample before what takes its values.
+        let count = if is_sampled { n + 1 } else { n } as f64;
         let seen: Vec<f64> = (1..=7)
             .map(|at| outcome.record.column(&format!("sink.seen[{at}]")).unwrap()[n])
             .collect();
