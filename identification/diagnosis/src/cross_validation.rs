@@ -742,6 +742,15 @@ mod tests {
     }
 
     #[test]
+    fn a_rival_gains_nine_tenths_and_leaves_little_more() {
+        // What was taken leaves a fifth.
+        assert!(rivals(0.73, 0.8, 1.5) && !rivals(0.71, 0.8, 1.5));
+        // And at most one and a half times that.
+        assert!(!rivals(0.73, 0.8, 1.3) && rivals(0.75, 0.8, 1.3));
+        assert!(!rivals(0.95, 0.99, 1.5));
+    }
+
+    #[test]
     fn what_holds_gains_enough_on_both_halves_beyond_doubt() {
         let own = |gain, deviate, both| Inside {
             gain,

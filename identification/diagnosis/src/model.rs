@@ -405,6 +405,8 @@ mod tests {
         let is_at = |candidate: &Candidate, q: f64| candidate.bound(&[q]).is_some();
         assert!(is_at(&signed, 2.0) && is_at(&signed, -2.0));
         assert!(!is_at(&signed, 1.99) && !is_at(&signed, -1.99) && !is_at(&signed, 0.0));
+        // Within a thousandth of the range.
+        assert!(is_at(&signed, 1.997) && is_at(&signed, -1.997) && !is_at(&signed, 1.995));
         let positive = candidate((0.0, 4.0), Scale::Linear(2.0));
         assert!(!is_at(&positive, 0.0) && is_at(&positive, 2.0));
     }

@@ -175,6 +175,27 @@ mod tests {
             .collect();
         let time = correlation_time(&series);
         assert!((8.0..9.5).contains(&time), "{time}");
+        // The mean is no part of it.
+        let moved: Vec<f64> = series.iter().map(|x| x + 100.0).collect();
+        assert!((correlation_time(&moved) / time - 1.0).abs() < 1e-6);
+        assert_eq!(correlation_time(&[2.0; 50]), 1.0);
+    }
+
+    #[test]
+    fn a_gain_that_is_the_same_everywhere_has_no_interval() {
+        for samples in [16, 100, 1001] {
+            let before: Vec<f64> = (0..samples)
+                .map(|k| (0.7 * f64::from(k)).sin() + 2.0)
+                .collect();
+            let after: Vec<f64> = before.iter().map(|value| 0.5 * value).collect();
+            let (low, high) = gain_interval(&before, &after);
+            assert!(
+                (low - 0.75).abs() < 1e-9 && (high - 0.75).abs() < 1e-9,
+                "{low} {high}"
+            );
+        }
+        let few = gain_interval(&[2.0; 15], &[1.0; 15]);
+        assert_eq!(few, (f64::NEG_INFINITY, f64::INFINITY));
     }
 
     #[test]
