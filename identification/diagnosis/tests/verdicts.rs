@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use diagnosis::{
-    Candidate, EffectParameter, ExtensibleModel, Judgement, Lesson, Observer, Point, Role, Scale,
-    Selected, SimulatedModel, Verdict, judge, nominal, select,
+    Candidate, EffectParameter, ExtensibleModel, Judgement, Lesson, Observer, PenalisedLikelihood,
+    Point, Role, Scale, Selected, SimulatedModel, Verdict, judge, nominal, select,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -51,6 +51,7 @@ fn force(point: &Point, record: usize, k: usize) -> f64 {
 struct Spring {
     candidates: Vec<Candidate>,
     measured: Vec<Vec<f64>>,
+    noise_price: f64,
 }
 
 impl Spring {
@@ -108,6 +109,7 @@ impl Spring {
         Self {
             candidates,
             measured: (0..3).map(&mut record).collect(),
+            noise_price: 0.0,
         }
     }
 }
@@ -141,6 +143,9 @@ impl ExtensibleModel for Spring {
     }
     fn with_learned_noise(&self, _: &Point, _: &[f64], _: &[usize]) -> Option<Lesson<Self>> {
         None
+    }
+    fn noise_price(&self) -> f64 {
+        self.noise_price
     }
     fn quiet_records(&self, _: &[usize]) -> Vec<usize> {
         Vec::new()
@@ -229,6 +234,27 @@ fn an_effect_is_named_with_its_size_and_predicts_what_was_not_fitted() {
         assert!(found.without[0].as_ref().unwrap().effects.is_empty());
         assert!(found.effects[0].confidence > 0.9);
     }
+}
+
+#[test]
+fn a_model_s_score_is_its_cost_with_the_prices_of_its_effects_and_noises() {
+    let mut spring = Spring::new(1.0, [0.4, 0.0, 0.0, 0.0]);
+    spring.noise_price = 7.0;
+    let selection = PenalisedLikelihood::of(&spring, &[0, 1], Observer::none());
+    let bare = selection.nominal().unwrap();
+    assert!((bare.score - bare.fit.cost - 7.0).abs() < 1e-6);
+    // Squares over the noise's, its determinant for each sample, and the squared deviation of the stiffness.
+    let squares: f64 = bare.fit.residuals.iter().map(|own| own * own).sum();
+    let samples = 2.0 * SAMPLES as f64;
+    let expected = squares + samples * 2.0 * NOISE.ln() + bare.fit.point.nuisance[0].powi(2);
+    assert!((bare.fit.cost - expected).abs() < 1e-6);
+    assert!((bare.mean_square() - squares / samples).abs() < 1e-9);
+    let extended = selection.extensions(&bare);
+    let best = &extended[0];
+    assert_eq!(best.effects(), [0]);
+    assert!((best.score - best.fit.cost - 7.0 - 18.0).abs() < 1e-6);
+    assert!(extended.is_sorted_by(|a, b| a.score <= b.score));
+    assert!(extended.iter().all(|own| own.score < bare.score));
 }
 
 #[test]

@@ -693,3 +693,41 @@ fn a_system_with_a_faulty_component_is_not_run() {
         found.findings
     );
 }
+
+#[test]
+fn what_a_variable_is_and_how_it_begins_go_together() {
+    let of = |attributes: &str| {
+        let plain = r#"<Float64 name="y" valueReference="4" causality="output"/>"#;
+        let more = format!(r#"{plain}<Float64 name="q" valueReference="7" {attributes}/>"#);
+        found(&THIRD.replace(plain, &more))
+    };
+    for (attributes, is_sound) in [
+        (
+            r#"causality="calculatedParameter" variability="fixed" initial="exact" start="1""#,
+            false,
+        ),
+        (
+            r#"causality="parameter" variability="fixed" initial="exact" start="1""#,
+            true,
+        ),
+        (
+            r#"causality="parameter" variability="fixed" initial="calculated""#,
+            false,
+        ),
+        (
+            r#"causality="local" variability="constant" initial="exact" start="1""#,
+            true,
+        ),
+        (
+            r#"causality="local" variability="constant" initial="approx" start="1""#,
+            false,
+        ),
+        (r#"causality="input" initial="approx" start="1""#, false),
+    ] {
+        let all = of(attributes);
+        let refused = all
+            .iter()
+            .any(|line| line.contains("`q`: causality") && line.contains(" with initial "));
+        assert_eq!(!refused, is_sound, "{attributes}: {all:?}");
+    }
+}
