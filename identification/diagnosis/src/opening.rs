@@ -175,6 +175,18 @@ mod tests {
             model: &Tones,
             share: 0.0101,
         };
+        assert_eq!(
+            (opening.nuisance(), opening.blocks(), opening.screen(7)),
+            (3, 2, 7)
+        );
+        assert_eq!(
+            [0, 1, 2].map(|i| opening.block_of(i)),
+            [None, Some(0), Some(1)]
+        );
+        assert_eq!(
+            (opening.record_name(0), opening.prior_width()),
+            ("tones", Tones.prior_width())
+        );
         let samples = [0, 1].map(|block| opening.samples(0, block));
         assert_eq!(samples, [21, 11]);
         let point = Point {

@@ -4,7 +4,7 @@
 
 use diagnosis::{
     Candidate, EffectParameter, ExtensibleModel, Judgement, Lesson, Observer, PenalisedLikelihood,
-    Point, Role, Scale, Selected, SimulatedModel, Verdict, judge, nominal, select,
+    Point, Role, SUREST, Scale, Selected, SimulatedModel, Verdict, judge, nominal, select,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -41,7 +41,8 @@ fn force(point: &Point, record: usize, k: usize) -> f64 {
     let effects = point.effects.iter();
     let of_effect = |(i, q): &(usize, Vec<f64>)| match q[..] {
         [size, range] => 0.1 * size * (own[1] / range).tanh(),
-        _ => 0.1 * q[0] * forces[*i],
+        // What is behind the others is another name of dry friction.
+        _ => 0.1 * q[0] * forces[if *i == 4 { 2 } else { *i }],
     };
     let extra: f64 = effects.map(of_effect).sum();
     (1.0 + KNOWN_TO * point.nuisance[0]) * own[0] + extra
@@ -296,6 +297,31 @@ fn the_general_case_of_an_effect_is_asked_for_where_the_special_one_leaves_trace
         );
         assert!(own.standard_error < 0.1 * truth, "{own:?}");
     }
+}
+
+#[test]
+fn two_effects_that_no_record_tells_apart_are_ambiguous() {
+    let mut spring = Spring::new(1.0, [0.0, 0.0, 0.5, 0.0]);
+    let mut twin = spring.candidates[2].clone();
+    twin.effect = "twin";
+    spring.candidates.push(twin);
+    let found = judge(&mut spring, &[0, 1], &[2], Observer::none()).unwrap();
+    assert_eq!(found.verdict, Verdict::Ambiguous);
+    let own = found.effects[0].effect;
+    let other = if own == "dry" { "twin" } else { "dry" };
+    assert_eq!(found.alternatives, [[other]]);
+    let [rival] = &found.rival_points[..] else {
+        panic!("{:?}", found.rival_points);
+    };
+    assert!((rival.effects[0].1[0] - 5.0).abs() < 0.1, "{rival:?}");
+    // Each as likely as the other.
+    assert!((found.effects[0].confidence - 0.5 * SUREST).abs() < 0.01);
+    let weights: Vec<f64> = found.candidates.iter().map(|own| own.weight).collect();
+    assert!(
+        weights.len() == 2 && weights.iter().all(|own| (own - 0.5).abs() < 0.01),
+        "{weights:?}"
+    );
+    assert!(found.candidates.iter().all(|own| own.explains > 0.99));
 }
 
 #[test]
