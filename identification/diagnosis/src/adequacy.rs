@@ -556,6 +556,65 @@ mod tests {
         }
     }
 
+    /// A tone on the line 40 of a record, and nothing else.
+    #[test]
+    fn a_tone_has_the_figures_of_its_line() {
+        let (n, size) = (1024, 3.0);
+        let tone = |k: usize| (std::f64::consts::TAU * 40.0 * k as f64 / n as f64 + 0.3).sin();
+        let series: Vec<f64> = (0..n).map(|k| size * tone(k)).collect();
+        // Its own form about a mean, which does not count.
+        let own: Vec<f64> = (0..n).map(|k| 5.0 + 0.1 * tone(k)).collect();
+        let other = (0..n).map(|k| f64::from(u8::from(k % 2 == 0))).collect();
+        let regressors = [("own".to_string(), own), ("other".to_string(), other)];
+        let all = tests("record", &series, &["one"], &regressors, 0.0, &STILL);
+        let of = |what: &str| {
+            let own = all.iter().find(|test| test.what.starts_with(what));
+            own.unwrap_or_else(|| panic!("no {what}"))
+        };
+        let length = n as f64;
+        let energy = size * size * length / 2.0;
+        assert!(of("record: one, mean").deviate.abs() < 1e-9);
+        let whole = of("record: one, mean square 4.500");
+        let expected = chi_square_deviate(energy / KNOWN_WHOLE.powi(2), length);
+        assert!((whole.deviate - expected).abs() < 1e-6);
+        // From the line 33 to 65, of 33 lines.
+        let band = of("record: one, below 0.064 of the sampling rate");
+        let power = (size * length / 2.0).powi(2);
+        let expected = chi_square_deviate(2.0 * power / (KNOWN.powi(2) * length), 66.0);
+        assert!((band.deviate / expected - 1.0).abs() < 1e-9);
+        let place = band.place.as_ref().unwrap();
+        assert!((place.over_floor - (power / length / 33.0).sqrt()).abs() < 1e-9);
+        let Part::Band(from, to) = place.part else {
+            panic!("{place:?}");
+        };
+        assert_eq!((from, to), (33.0 / length, 66.0 / length));
+        assert!(of("record: one, below 0.032 of the sampling rate").deviate < 0.0);
+        // All of it is along its own form.
+        let expected = (1.0 - UNRELATED) * energy.sqrt();
+        assert!((of("record: one against own").deviate - expected).abs() < 1e-6);
+        let other = of("record: one against other").deviate;
+        assert!((other + UNRELATED * energy.sqrt()).abs() < 1e-6, "{other}");
+        // A level alone is a mean of that many samples.
+        let level = tests("record", &vec![0.5; n], &["one"], &[], 0.0, &STILL);
+        assert!(
+            (level[0].deviate - 0.5 * length.sqrt()).abs() < 1e-9,
+            "{level:?}"
+        );
+        assert!(tests("record", &[1.0; 63], &["one"], &[], 0.0, &STILL).is_empty());
+    }
+
+    #[test]
+    fn stated_tests_have_no_tolerance() {
+        let own = |deviate, is_stated| Test {
+            is_stated,
+            ..Test::of("own".to_string(), deviate)
+        };
+        let most = LARGEST_DEVIATE;
+        assert!(own(1.01 * most, false).fails(1.0) && !own(0.99 * most, false).fails(1.0));
+        assert!(!own(1.9 * most, false).fails(2.0) && own(2.1 * most, false).fails(2.0));
+        assert!(own(1.01 * most, true).fails(2.0) && !own(0.99 * most, true).fails(2.0));
+    }
+
     #[test]
     fn a_burst_is_not_a_model_s_error_and_a_loud_half_is() {
         let failed = |loud: std::ops::Range<usize>| {

@@ -742,6 +742,71 @@ mod tests {
     }
 
     #[test]
+    fn a_rival_gains_nine_tenths_and_leaves_little_more() {
+        // What was taken leaves a fifth.
+        assert!(rivals(0.73, 0.8, 1.5) && !rivals(0.71, 0.8, 1.5));
+        // And at most one and a half times that.
+        assert!(!rivals(0.73, 0.8, 1.3) && rivals(0.75, 0.8, 1.3));
+        assert!(!rivals(0.95, 0.99, 1.5));
+    }
+
+    #[test]
+    fn what_holds_gains_enough_on_both_halves_beyond_doubt() {
+        let own = |gain, deviate, both| Inside {
+            gain,
+            deviate,
+            both,
+        };
+        assert!(own(0.06, 3.1, true).holds());
+        assert!(!own(0.04, 3.1, true).holds() && !own(0.06, 2.9, true).holds());
+        assert!(!own(0.06, 3.1, false).holds());
+    }
+
+    /// A drift of power 1/2 with and without steps of 0.3 to either side at random: the differences of the squared
+    /// errors have the mean 0.09 and the standard deviation `2 0.3 / √2`, which hardly shows beside the drift.
+    #[test]
+    fn a_small_effect_is_told_by_its_own_differences_beside_a_drift() {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let half = 20_000;
+        let drift = |k: usize| (k as f64 / 300.0).sin();
+        let after: Vec<f64> = (0..half).map(drift).collect();
+        let mut rough = || -> Vec<f64> {
+            let all = after.iter();
+            all.map(|own| own + if random.random::<bool>() { 0.3 } else { -0.3 })
+                .collect()
+        };
+        let before = [rough(), rough()];
+        let after = [after.clone(), after];
+        let found = compare(&before, &after);
+        let samples = 2.0 * half as f64;
+        let expected = 0.09 / (0.6 / 2.0_f64.sqrt()) * samples.sqrt();
+        assert!(
+            (found.deviate / expected - 1.0).abs() < 0.1,
+            "{} {expected}",
+            found.deviate
+        );
+        assert!(
+            (found.gain - 0.09 / 0.59).abs() < 0.01 && found.both,
+            "{}",
+            found.gain
+        );
+        let back = compare(&after, &before);
+        assert!(back.deviate < 0.0 && back.gain < 0.0 && !back.both);
+        // White errors that are halved: of each sample, twice the logarithm of two.
+        let white = |size: f64| {
+            before.each_ref().map(|own| -> Vec<f64> {
+                own.iter()
+                    .zip(&after[0])
+                    .map(|(a, b)| size * (a - b))
+                    .collect()
+            })
+        };
+        let found = compare(&white(2.0), &white(1.0));
+        assert!(found.gain == 0.75 && found.deviate > 0.9 * (samples * 4.0_f64.ln()).sqrt());
+    }
+
+    #[test]
     fn how_a_record_begins_is_found_where_a_fit_to_its_end_left_it_far_away() {
         let model = Swing((0..SAMPLES).map(|k| swing(0.3, k)).collect());
         let begun = |begin: f64| Point {

@@ -153,7 +153,7 @@ impl Scale {
             Self::Linear(unit) => unit,
             Self::Factor(unit) => unit * (internal * unit).exp(),
             Self::Logarithmic => internal.exp(),
-            Self::Inverse(unit) => unit / (internal * internal),
+            Self::Inverse(unit) => -unit / (internal * internal),
         }
     }
 }
@@ -375,11 +375,38 @@ mod tests {
     }
 
     #[test]
+    fn values_and_coordinates_are_each_other_s_inverse_on_every_scale() {
+        for (scale, value, internal) in [
+            (Scale::Linear(2.0), 3.0, 1.5),
+            (Scale::Factor(0.5), 0.25, 2.0 * 1.25_f64.ln()),
+            (Scale::Logarithmic, 3.0, 3.0_f64.ln()),
+            (Scale::Inverse(6.0), 3.0, 2.0),
+        ] {
+            let own = candidate((0.0, 10.0), scale);
+            let [found] = own.internal(&[value])[..] else {
+                panic!("one coordinate");
+            };
+            assert!((found - internal).abs() < 1e-12, "{scale:?}");
+            let back = own.values(&[found]);
+            assert!(back.len() == 1 && (back[0] - value).abs() < 1e-12);
+            // The slope by a small difference.
+            let step = 1e-6;
+            let rise = scale.to_value(found + step) - scale.to_value(found - step);
+            assert!(
+                (rise / (2.0 * step) - scale.slope(found)).abs() < 1e-6,
+                "{scale:?}"
+            );
+        }
+    }
+
+    #[test]
     fn a_size_at_either_end_is_at_its_bound_but_for_zero() {
         let signed = candidate((-4.0, 4.0), Scale::Linear(2.0));
         let is_at = |candidate: &Candidate, q: f64| candidate.bound(&[q]).is_some();
         assert!(is_at(&signed, 2.0) && is_at(&signed, -2.0));
         assert!(!is_at(&signed, 1.99) && !is_at(&signed, -1.99) && !is_at(&signed, 0.0));
+        // Within a thousandth of the range.
+        assert!(is_at(&signed, 1.997) && is_at(&signed, -1.997) && !is_at(&signed, 1.995));
         let positive = candidate((0.0, 4.0), Scale::Linear(2.0));
         assert!(!is_at(&positive, 0.0) && is_at(&positive, 2.0));
     }

@@ -170,6 +170,51 @@ mod tests {
     use super::*;
 
     #[test]
+    fn events_are_lines_with_their_figures() {
+        let model = |step, effects: &[(&'static str, &[f64])]| Progress::Model {
+            step,
+            effects: effects
+                .iter()
+                .map(|(name, own)| (*name, own.to_vec()))
+                .collect(),
+            figures: vec![("score", -12.5), ("gain", 3.0)],
+        };
+        for (event, line) in [
+            (Progress::Fitting("a, b".into()), "fitting a, b"),
+            (Progress::Trying("a delay".into()), "  trying a delay"),
+            (
+                Progress::Noise {
+                    gain: 120.0,
+                    figures: vec![("level", 0.5), ("corner", 2.0)],
+                },
+                "  noise learned: gain 1.2000e2, level 0.500, corner 2.000",
+            ),
+            (
+                model(Step::Nominal, &[]),
+                "  nominal; score -1.2500e1, gain 3.0000e0",
+            ),
+            (
+                model(Step::Screened, &[("delay", &[0.002])]),
+                "    screened: delay [2.0000e-3]; score -1.2500e1, gain 3.0000e0",
+            ),
+            (
+                model(Step::Extended, &[("delay", &[0.002]), ("dry", &[4.0, 1.0])]),
+                "  extended: delay [2.0000e-3] + dry [4.0000e0, 1.0000e0]; score -1.2500e1, gain 3.0000e0",
+            ),
+            (
+                model(Step::Refitted, &[]),
+                "  refitted; score -1.2500e1, gain 3.0000e0",
+            ),
+            (
+                model(Step::Reduced, &[]),
+                "  reduced; score -1.2500e1, gain 3.0000e0",
+            ),
+        ] {
+            assert_eq!(event.to_string(), line);
+        }
+    }
+
+    #[test]
     fn a_search_that_asks_after_the_deadline_has_been_cut() {
         let far = Deadline::after(Duration::MAX);
         let observer = Observer::none().until(&far);

@@ -175,6 +175,27 @@ mod tests {
             .collect();
         let time = correlation_time(&series);
         assert!((8.0..9.5).contains(&time), "{time}");
+        // The mean is no part of it.
+        let moved: Vec<f64> = series.iter().map(|x| x + 100.0).collect();
+        assert!((correlation_time(&moved) / time - 1.0).abs() < 1e-6);
+        assert_eq!(correlation_time(&[2.0; 50]), 1.0);
+    }
+
+    #[test]
+    fn a_gain_that_is_the_same_everywhere_has_no_interval() {
+        for samples in [16, 100, 1001] {
+            let before: Vec<f64> = (0..samples)
+                .map(|k| (0.7 * f64::from(k)).sin() + 2.0)
+                .collect();
+            let after: Vec<f64> = before.iter().map(|value| 0.5 * value).collect();
+            let (low, high) = gain_interval(&before, &after);
+            assert!(
+                (low - 0.75).abs() < 1e-9 && (high - 0.75).abs() < 1e-9,
+                "{low} {high}"
+            );
+        }
+        let few = gain_interval(&[2.0; 15], &[1.0; 15]);
+        assert_eq!(few, (f64::NEG_INFINITY, f64::INFINITY));
     }
 
     #[test]
@@ -187,6 +208,22 @@ mod tests {
             .collect();
         let (low, high) = gain_interval(&before, &after);
         assert!(low < 0.5 && 0.5 < high && high - low < 0.1, "{low} {high}");
+    }
+
+    /// Means of any parts of a steady series are those of all of it, whatever the blocks cover.
+    #[test]
+    fn an_interval_of_steady_means_is_their_statistic() {
+        for samples in [5, 37, 1000, 1999] {
+            let sums = [3.0, 8.0].map(|value| running(std::iter::repeat_n(value, samples)));
+            let [low, high] = bootstrap([&sums[0], &sums[1]], |[a, b]| b - 2.0 * a);
+            assert!(
+                (low - 2.0).abs() < 1e-9 && (high - 2.0).abs() < 1e-9,
+                "{samples}"
+            );
+        }
+        let few = running([1.0, 2.0, 3.0].into_iter());
+        assert_eq!(few, [0.0, 1.0, 3.0, 6.0]);
+        assert_eq!(bootstrap([&few], |[mean]| mean), [0.0, 0.0]);
     }
 
     #[test]

@@ -503,6 +503,14 @@ fn weigh<M: ExtensibleModel>(
             ..selection.hypothesis(&start)?
         })
     });
+    // Fits from two starts may end at one model, which is not its own rival.
+    let mut known = vec![best.effects()];
+    let others = others.filter(|own| {
+        let set = own.effects();
+        let is_new = !known.contains(&set);
+        known.push(set);
+        is_new
+    });
     let others: Vec<Hypothesis> = others.collect();
     let nominal_square = nominal.mean_square();
     let nominal_point = nominal.fit.point.clone();
@@ -711,6 +719,41 @@ mod tests {
         let (effect, _, value, error, _) = figures[2];
         assert_eq!((effect, value), ("first", 2.5));
         assert!(error.is_nan());
+    }
+
+    #[test]
+    fn an_effect_has_shrunk_where_all_its_sizes_have() {
+        use crate::model::EffectParameter;
+        let parameter = |scale, role| EffectParameter {
+            name: "size",
+            unit: "N",
+            scale,
+            role,
+            bounds: (-10.0, 10.0),
+        };
+        let size = Role::Size { weak: 0.1 };
+        let shape = Role::Shape {
+            typical: 1.0,
+            spread: 0.5,
+        };
+        let two = [size, size, shape].map(|role| parameter(Scale::Linear(1.0), role));
+        let two = Candidate::new("two", two.to_vec(), Vec::new());
+        for (own, again, expected) in [
+            ([2.0, -4.0, 3.0], [0.9, -1.9, 3.0], true),
+            ([2.0, -4.0, 3.0], [1.1, -1.9, 0.0], false),
+            ([2.0, -4.0, 3.0], [0.9, -2.1, 3.0], false),
+            // Of another sign.
+            ([2.0, -4.0, 3.0], [-5.0, 5.0, 3.0], true),
+        ] {
+            assert_eq!(has_shrunk(&two, &own, &again), expected, "{again:?}");
+        }
+        // A logarithm says nothing of that, and a shape is no size.
+        let none = [
+            parameter(Scale::Logarithmic, size),
+            parameter(Scale::Linear(1.0), shape),
+        ];
+        let none = Candidate::new("none", none.to_vec(), Vec::new());
+        assert!(!has_shrunk(&none, &[2.0, 2.0], &[0.1, 0.1]));
     }
 
     #[test]

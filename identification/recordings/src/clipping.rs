@@ -81,6 +81,25 @@ mod tests {
     }
 
     #[test]
+    fn a_dwell_is_cut_where_the_next_reading_is_far_or_nothing_is_known() {
+        // Four steps below on one side alone; what is farther away hardly rises.
+        let left = [96.0, 96.0, 96.0];
+        let right = [99.0, 98.0, 98.0];
+        let values = [&left[..], &[100.0; 4], &right].concat();
+        assert!(cuts_a_peak(&values, 3, 7, 1.0));
+        assert!(!cuts_a_peak(&values, 3, 7, 2.0));
+        let turned: Vec<f64> = values.iter().rev().copied().collect();
+        assert!(cuts_a_peak(&turned, 3, 7, 1.0));
+        // Of one sample to a side nothing follows, nor of no dwell.
+        let flat = [99.0, 100.0, 100.0, 100.0, 99.0, 99.0, 99.0];
+        assert!(cuts_a_peak(&flat, 1, 4, 1.0));
+        assert!(cuts_a_peak(&[99.0; 9], 4, 4, 1.0));
+        // In the lowest readings as in the highest.
+        let lowest: Vec<f64> = values.iter().map(|value| -value).collect();
+        assert!(cuts_a_peak(&lowest, 3, 7, 1.0) && !cuts_a_peak(&lowest, 3, 7, 2.0));
+    }
+
+    #[test]
     fn coarse_steps_are_not_taken_for_clipping() {
         for peak in [20.0, 60.3, 150.0] {
             let natural = dwells(peak, f64::INFINITY);

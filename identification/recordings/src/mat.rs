@@ -535,6 +535,64 @@ mod tests {
     }
 
     #[test]
+    fn what_a_table_cannot_hold_is_left_out_with_a_note() {
+        let own = Writer { little: true };
+        let complex = |name: &str, flag: u32, sizes: [u32; 2]| {
+            let values: Vec<u8> = [1.0_f64, 2.0, 3.0]
+                .iter()
+                .flat_map(|it| it.to_le_bytes())
+                .collect();
+            let all = [
+                own.head(6 | flag << 8, sizes, name),
+                own.element(9, &values),
+                own.element(9, &values),
+            ];
+            own.element(MATRIX, &all.concat())
+        };
+        // Flags of a global and of a logical array do not matter.
+        let elements = [
+            complex("z", 0x08, [3, 1]),
+            complex("global", 0x04, [3, 1]),
+            complex("logical", 0x02, [3, 1]),
+            own.element(MATRIX, &own.head(1, [1, 1], "cells")),
+            own.element(MATRIX, &own.head(2, [2, 1], "pair")),
+        ];
+        let text = read(&own.file(&elements)).unwrap();
+        assert_eq!(text.text.lines().next(), Some("global,logical"));
+        let note = text.note.unwrap();
+        for part in [
+            "`z` (complex",
+            "`cells` (a cell array)",
+            "`pair` (an array of structures)",
+        ] {
+            assert!(note.contains(part), "{note}");
+        }
+        assert!(!note.contains("global"));
+        // More sizes than values.
+        let short = own.file(&[complex("x", 0, [4, 1])]);
+        assert!(
+            read(&short)
+                .unwrap_err()
+                .to_string()
+                .contains("a damaged MAT file")
+        );
+    }
+
+    #[test]
+    fn a_mat_file_is_told_by_its_first_words_or_its_marks() {
+        let file = Writer { little: false }.file(&[]);
+        assert!(is_mat(&file));
+        // Another program's words, with the marks of the format.
+        let mut other = file.clone();
+        other[..8].copy_from_slice(b"Octave  ");
+        assert!(is_mat(&other));
+        other[VERSION + 2] = b'?';
+        assert!(!is_mat(&other));
+        assert!(is_mat(b"MATLAB 5.0 MAT-file") && !is_mat(b"MATLAB is a program"));
+        assert!(!is_mat(b"") && !is_mat(b"a MAT-file"));
+    }
+
+    #[test]
     fn what_cannot_be_read_is_said_with_its_remedy() {
         let own = Writer { little: true };
         let whole = own.file(&[own.doubles("x", [3, 1], &[1.0, 2.0, 3.0])]);

@@ -5,7 +5,10 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use recordings::{Called, Channel, DataError, Pick, Recording, Sheet, TimeBase, Wanted, decode};
+use recordings::{
+    Called, Channel, DataError, Named, Pick, Recording, Sheet, TimeBase, Wanted, columns_called,
+    decode, named_columns,
+};
 
 fn parse(bytes: &[u8]) -> Result<Recording, DataError> {
     let file = Path::new("a.csv");
@@ -372,6 +375,28 @@ fn channels_that_are_called_otherwise() {
     assert_eq!(read.samples(Channel::Displacement), [0.001, 0.002]);
     assert_eq!(read.samples(Channel::ActuatorForce), [2000.0, 3000.0]);
     assert_eq!(read.stamps().unwrap()[1], 0.002);
+    // The same columns by name, in the order of the channels.
+    let named = |all: Vec<Named>| -> Vec<(Channel, String, String)> {
+        all.into_iter()
+            .map(|own| (own.channel, own.head, own.unit))
+            .collect()
+    };
+    let own = |channel, head: &str, unit: &str| (channel, head.to_string(), unit.to_string());
+    let mut found = named(columns_called(&file, &names).unwrap());
+    let mut expected = vec![
+        own(Channel::Time, "t [ms]", "ms"),
+        own(Channel::Displacement, "LVDT 1", "mm"),
+        own(Channel::ActuatorForce, "LC [kN]", "kN"),
+    ];
+    for all in [&mut found, &mut expected] {
+        all.sort_by(|a, b| a.1.cmp(&b.1));
+    }
+    assert_eq!(found, expected);
+    let found = named(named_columns(&file).unwrap());
+    assert!(
+        found.contains(&own(Channel::Displacement, "position [m]", "m")),
+        "{found:?}"
+    );
     let missing = [called(Channel::Velocity, "v1", None)];
     let error = Recording::read_called(&file, "a", &missing).unwrap_err();
     assert!(error.to_string().contains("no column `v1`"), "{error}");
@@ -387,4 +412,57 @@ fn a_reference_without_a_unit_is_left_alone_beside_a_voltage_only() {
     assert_eq!(read.samples(Channel::ValveCommand), [0.5, 0.5]);
     let alone = fault("time [s],reference,displacement [mm]\n0,1,2\n1,2,3\n");
     assert!(alone.contains("`reference` has no unit"), "{alone}");
+}
+
+#[test]
+fn a_channel_s_samples_are_replaced_by_as_many_others_or_taken_out() {
+    let mut own = read(PLAIN);
+    let command = vec![3.0, 4.0];
+    own.replace(Channel::ValveCommand, command.clone()).unwrap();
+    assert_eq!(own.samples(Channel::ValveCommand), command);
+    own.replace(Channel::Velocity, vec![5.0, 6.0]).unwrap();
+    assert_eq!(own.channels().count(), 3);
+    let refused = own
+        .replace(Channel::Velocity, vec![5.0])
+        .unwrap_err()
+        .to_string();
+    assert!(refused.contains("has 1 samples, not 2"), "{refused}");
+    assert_eq!(own.samples(Channel::Velocity), [5.0, 6.0]);
+    let own = own.without(Channel::Velocity);
+    assert_eq!(
+        (own.channel(Channel::Velocity), own.channels().count()),
+        (None, 2)
+    );
+}
+
+#[test]
+fn a_described_unit_must_be_that_of_the_header() {
+    let file = Path::new("rig.csv");
+    let text = || decode(file, b"t [s],F [kN]\n0,2\n0.1,3\n").unwrap();
+    let picked = |unit| {
+        let wanted = Wanted {
+            is_column: &|cell| cell.starts_with('t'),
+            header: "`t,F`",
+        };
+        let sheet = Sheet::parse(file, text(), wanted).unwrap();
+        assert!(!sheet.is_empty() && sheet.len() == 2);
+        let time = Pick {
+            channel: Channel::Time,
+            head: "t [s]",
+            unit: "s",
+        };
+        let force = Pick {
+            channel: Channel::ActuatorForce,
+            head: "F [kN]",
+            unit,
+        };
+        Recording::pick(&sheet, "rig", &[time, force]).map_err(|error| error.to_string())
+    };
+    assert_eq!(
+        picked("kN").unwrap().samples(Channel::ActuatorForce),
+        [2000.0, 3000.0]
+    );
+    let refused = picked("N").unwrap_err();
+    let said = "column `F [kN]` is described in N; expected the unit of its header, kN";
+    assert!(refused.contains(said), "{refused}");
 }

@@ -129,7 +129,8 @@ pub fn delay_by_correlation(input: &[f64], output: &[f64], period: f64, longest:
     } else {
         0.0
     };
-    (best as f64 + shift) * period
+    // At the longest the correlation may still rise, and the parabola's top be anywhere beyond.
+    ((best as f64 + shift) * period).min(longest)
 }
 
 #[cfg(test)]
@@ -171,5 +172,23 @@ mod tests {
         let output: Vec<f64> = (0..5000).map(|k| wave(h * k as f64 - delay)).collect();
         let got = delay_by_correlation(&input, &output, h, 0.05);
         assert!((got - delay).abs() < 1e-4, "{got}");
+        for delay in [0.0122, 0.0144] {
+            let output: Vec<f64> = (0..5000).map(|k| wave(h * k as f64 - delay)).collect();
+            let got = delay_by_correlation(&input, &output, h, 0.05);
+            assert!((got - delay).abs() < 1e-4, "{got}");
+        }
+        // A drift that is much larger than the signals does not hide it.
+        let drifting = |values: &[f64], rate: f64| -> Vec<f64> {
+            let all = values.iter().enumerate();
+            all.map(|(k, value)| value + rate * h * k as f64).collect()
+        };
+        let (input, output) = (drifting(&input, 30.0), drifting(&output, -20.0));
+        let got = delay_by_correlation(&input, &output, h, 0.05);
+        assert!((got - delay).abs() < 1e-3, "{got}");
+        // Nor is it looked for beyond the longest.
+        let got = delay_by_correlation(&input, &output, h, 0.004);
+        assert!(got <= 0.004, "{got}");
+        assert_eq!(delay_by_correlation(&input, &input, h, 0.05), 0.0);
+        assert_eq!(delay_by_correlation(&[1.0], &[1.0], h, 0.05), 0.0);
     }
 }

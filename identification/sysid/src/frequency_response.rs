@@ -130,6 +130,37 @@ mod tests {
     }
 
     #[test]
+    fn a_band_is_from_the_first_to_the_last_line_with_power() {
+        let (period, segment) = (0.002, 500);
+        // Lines are 1 Hz apart; a third tone has a hundredth of the power.
+        let tones = [(20.0, 1.0), (60.0, 0.5), (90.0, 0.1)];
+        let signal: Vec<f64> = (0..5000)
+            .map(|k| {
+                let t = period * f64::from(k);
+                let all = tones.iter();
+                all.map(|(rate, size)| size * (TAU * rate * t).sin()).sum()
+            })
+            .collect();
+        for (part, first, last) in [(0.1, 20.0, 60.0), (0.5, 20.0, 20.0), (1e-3, 20.0, 90.0)] {
+            let (from, to, lines) = excited_band(&signal, period, segment, part).unwrap();
+            // A window spreads a tone over its neighbours.
+            assert!(
+                (from - first).abs() < 2.5 && (to - last).abs() < 2.5,
+                "{from} {to}"
+            );
+            let tones = tones
+                .iter()
+                .filter(|(rate, _)| (first..=last).contains(rate));
+            assert!((1..=5).contains(&(lines / tones.count())), "{lines}");
+        }
+        assert_eq!(
+            excited_band(&[0.0; 2000], period, segment, 0.1).unwrap(),
+            (0.0, 0.0, 0)
+        );
+        assert!(excited_band(&signal[..400], period, segment, 0.1).is_err());
+    }
+
+    #[test]
     fn the_joint_estimate_is_unbiased_in_closed_loop_and_the_direct_one_is_not() {
         let (r, u, y) = loop_data();
         let truth = |f: f64| {

@@ -85,6 +85,16 @@ mod tests {
     }
 
     #[test]
+    fn nothing_has_nothing_between_its_samples() {
+        assert!(band_limited(&[], 3, false).is_empty());
+        assert!(band_limited(&[1.0, 2.0], 0, true).is_empty());
+        assert_eq!(band_limited(&[1.0, 2.0], 1, false), [1.0, 2.0]);
+        // A constant is one everywhere, also beyond its ends.
+        let all = band_limited(&[3.0; 5], 4, false);
+        assert!(all.len() == 20 && all.iter().all(|value| (value - 3.0).abs() < 1e-12));
+    }
+
+    #[test]
     fn a_period_goes_on_beyond_its_end() {
         let tone = |t: f64| (std::f64::consts::TAU * 3.0 * t / 40.0).cos();
         let samples: Vec<f64> = (0..40).map(|k| tone(f64::from(k))).collect();

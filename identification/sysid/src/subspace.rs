@@ -367,3 +367,43 @@ impl Scaled {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By their definition: columns of the past of all channels, inputs of the sample, its outputs.
+    fn summed(channels: &[Vec<f64>], past: usize, inputs: usize, through: usize) -> DMatrix<f64> {
+        let samples = channels[0].len();
+        let mut columns: Vec<Vec<f64>> = Vec::new();
+        let column = |channel: &[f64], lag: usize| channel[past - lag..samples - lag].to_vec();
+        for lag in 1..=past {
+            columns.extend(channels.iter().map(|channel| column(channel, lag)));
+        }
+        columns.extend(channels[..through].iter().map(|channel| column(channel, 0)));
+        columns.extend(channels[inputs..].iter().map(|channel| column(channel, 0)));
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+            product(&columns[i], &columns[j])
+        })
+    }
+
+    #[test]
+    fn products_that_follow_from_each_other_are_those_of_their_columns() {
+        let channel = |rate: f64, shift: f64| -> Vec<f64> {
+            (0..40)
+                .map(|k| (rate * f64::from(k) + shift).sin() + 0.5)
+                .collect()
+        };
+        let channels = [channel(0.7, 0.1), channel(1.9, 0.4), channel(0.3, 2.0)];
+        for (past, inputs, through) in [(1, 1, 0), (3, 2, 0), (3, 2, 2), (5, 1, 1)] {
+            let found = lagged_products(&channels, past, inputs, through);
+            let expected = summed(&channels, past, inputs, through);
+            assert_eq!(found.shape(), expected.shape());
+            assert!(
+                (found - expected).amax() < 1e-11,
+                "{past} {inputs} {through}"
+            );
+        }
+    }
+}

@@ -12,6 +12,7 @@ use sysid::instrumental_variables::{
 use sysid::least_squares::{Triangular, reduce};
 use sysid::state_variable_filter::Between;
 use sysid::subspace::{Options, SubspaceModel, identify};
+use sysid::transfer_function::{self, Structure};
 
 const PERIOD: f64 = 0.002;
 
@@ -334,5 +335,121 @@ fn tall_problems_have_the_solution_of_their_normal_equations() {
     for target in 0..2 {
         assert!((found[(2, target)] - found[(3, target)]).abs() < 1e-9);
         assert!((2.0 * found[(2, target)] - expected[(2, target)]).abs() < 1e-9);
+    }
+}
+
+/// Held inputs come six samples later; an offset and noise are added.
+#[test]
+fn a_transfer_function_is_found_with_its_delay_offset_and_errors() {
+    let (numerator, denominator) = ([3.0, 100.0], [4.0, 100.0]);
+    let delay = 6;
+    let input = levels(2500, 4);
+    let late: Vec<f64> = (0..input.len())
+        .map(|k| input[k.saturating_sub(delay)])
+        .collect();
+    let from_rest: Vec<f64> = late.iter().map(|value| value - late[0]).collect();
+    let clean = continuous(numerator, denominator, &from_rest, PERIOD);
+    let mut generator = ChaCha8Rng::seed_from_u64(9);
+    let noise = 0.02;
+    let output: Vec<f64> = clean
+        .iter()
+        .map(|value| 0.7 + value + noise * uniform(&mut generator))
+        .collect();
+    let structure = Structure {
+        order: 2,
+        zeros: 1,
+        longest_delay: Some(0.04),
+        corner: 30.0,
+        between: Between::Held,
+    };
+    let found = transfer_function::identify(&input, &output, PERIOD, structure).unwrap();
+    assert_eq!((found.numerator.len(), found.denominator.len()), (2, 3));
+    assert_eq!(found.denominator[0], 1.0);
+    let own = [
+        found.numerator[0],
+        found.numerator[1],
+        found.denominator[1],
+        found.denominator[2],
+        found.delay,
+    ];
+    let truth = [3.0, 100.0, 4.0, 100.0, PERIOD * delay as f64];
+    assert_eq!(found.standard_error.len(), 5);
+    for ((own, truth), error) in own.iter().zip(truth).zip(&found.standard_error) {
+        assert!((own - truth).abs() < 5.0 * error, "{own} {truth} {error}");
+        assert!(*error > 0.0 && *error < 0.02 * truth, "{own}: {error}");
+    }
+    assert!((found.offset - 0.7).abs() < 2e-3, "{}", found.offset);
+    // What is left is the noise, uniform over 2 `noise`.
+    let mean = output.iter().sum::<f64>() / output.len() as f64;
+    let spread = output.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+    let size = (spread / output.len() as f64).sqrt();
+    let expected = noise / 3.0_f64.sqrt() / size;
+    assert!(
+        (found.normalised_error / expected - 1.0).abs() < 0.05,
+        "{}",
+        found.normalised_error
+    );
+    let again = found.simulate(&input, PERIOD, Between::Held);
+    for (k, (value, clean)) in again.iter().zip(&clean).enumerate() {
+        let expected = 0.7 + clean;
+        assert!((value - expected).abs() < 0.02, "{k}: {value} {expected}");
+        assert!((found.simulated[k] - expected).abs() < 0.02, "{k}");
+    }
+    // Without a delay, the shift is not found.
+    let none = Structure {
+        longest_delay: None,
+        ..structure
+    };
+    let without = transfer_function::identify(&input, &output, PERIOD, none).unwrap();
+    assert_eq!(without.delay, 0.0);
+    assert!(
+        without.normalised_error > 1.1 * found.normalised_error,
+        "{} {}",
+        without.normalised_error,
+        found.normalised_error
+    );
+    for (input, output, what) in [
+        (vec![2.0; 100], levels(100, 1), "the input is constant"),
+        (levels(100, 1), vec![2.0; 100], "the output is constant"),
+    ] {
+        let refused = transfer_function::identify(&input, &output, PERIOD, structure);
+        assert!(refused.unwrap_err().to_string().contains(what));
+    }
+}
+
+#[test]
+fn two_experiments_give_one_transfer_function_and_an_offset_each() {
+    let (numerator, denominator) = ([3.0, 100.0], [4.0, 100.0]);
+    let data = [(5, 0.5), (6, -2.0)].map(|(seed, offset)| {
+        let input = levels(4000, seed);
+        let output = continuous(numerator, denominator, &input, PERIOD);
+        let output: Vec<f64> = output.iter().map(|value| value + offset).collect();
+        (input, output)
+    });
+    let signals: Vec<Signals> = data
+        .iter()
+        .map(|(input, output)| Signals {
+            output: Signal::exact(output, Between::Straight),
+            inputs: vec![Signal::exact(input, Between::Held)],
+        })
+        .collect();
+    let filter = [1.0, 60.0, 900.0];
+    let found = regress(&signals, &[vec![1, 0]], PERIOD, &filter, &[]).unwrap();
+    for (value, expected) in [
+        (found.denominator[1], 4.0),
+        (found.denominator[2], 100.0),
+        (found.numerators[0][0], 3.0),
+        (found.numerators[0][1], 100.0),
+    ] {
+        let error: f64 = value / expected - 1.0;
+        assert!(error.abs() < 0.01, "{found:?}");
+    }
+    // What is known is taken from both before the rest is fitted.
+    for (power, value) in [(0, 100.0), (1, 4.0)] {
+        let given = regress(&signals, &[vec![1, 0]], PERIOD, &filter, &[(power, value)]).unwrap();
+        assert_eq!(given.denominator[2 - power], value);
+        let rest = given.denominator[1 + power] / [4.0, 100.0][power] - 1.0;
+        let gain = given.numerators[0][1] / 100.0 - 1.0;
+        assert!(rest.abs() < 0.01 && gain.abs() < 0.01, "{given:?}");
     }
 }

@@ -185,7 +185,7 @@ fn named(
     }
 }
 
-fn folders(findings: &mut Findings, names: &[String]) {
+pub(super) fn folders(findings: &mut Findings, names: &[String]) {
     let known = [
         "modelDescription.xml",
         "model.png",
@@ -236,16 +236,15 @@ fn folders(findings: &mut Findings, names: &[String]) {
     }
 }
 
-fn licences(findings: &mut Findings, names: &[String]) {
+pub(super) fn licences(findings: &mut Findings, names: &[String]) {
     let folders = [
         "documentation/licenses/",
         "licenses/",
         "documentation/license",
     ];
+    // A folder alone contains none.
     let is_licence = |name: &String| {
-        folders
-            .iter()
-            .any(|folder| name.starts_with(folder) && name.len() > folder.len())
+        !name.ends_with('/') && folders.iter().any(|folder| name.starts_with(folder))
     };
     if !names.iter().any(is_licence) {
         findings.note("archive", "documentation/licenses contains no licence");

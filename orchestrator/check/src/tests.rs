@@ -282,6 +282,11 @@ fn the_rules_of_fmi_3_are_checked() {
             ),
             ("start=\"3\"", "start=\"3 9\"", &["warning", "`n`", "9"]),
             (
+                "causality=\"parameter\" start=\"3\"",
+                "causality=\"parameter\" initial=\"approx\" start=\"3\"",
+                &["error", "`n`", "causality parameter with initial approx"],
+            ),
+            (
                 "name=\"y\" valueReference=\"4\" causality=\"output\"",
                 "name=\"y\" valueReference=\"4\" causality=\"output\" priority=\"1\"",
                 &["error", "priority"],
@@ -549,4 +554,180 @@ fn a_file_is_checked_by_its_name_and_its_findings_are_sorted() {
     assert!(told.ends_with("notes.txt: expected an .fmu or an .ssp file"));
     let told = validate(&place("none.fmu"), None).unwrap_err().to_string();
     assert!(told.contains("none.fmu: No such file"), "{told}");
+}
+
+#[test]
+fn an_array_has_as_many_start_values_as_its_structural_parameter_says() {
+    let sized = |name: &str, start: &str| {
+        let array = format!(
+            r#"<Float64 name="y" valueReference="4" causality="output"/>
+            <UInt64 name="size" valueReference="5" causality="structuralParameter" start="3"/>
+            <UInt64 name="other" valueReference="6" causality="{name}" start="2"/>
+            <Float64 name="a" valueReference="7" causality="input" start="{start}"><Dimension valueReference="5"/>
+            </Float64>"#
+        );
+        let plain = r#"<Float64 name="y" valueReference="4" causality="output"/>"#;
+        found(&THIRD.replace(plain, &array))
+    };
+    for causality in ["parameter", "structuralParameter"] {
+        assert_eq!(sized(causality, "1 2 3"), [""; 0]);
+        assert_eq!(sized(causality, "1"), [""; 0]);
+        let wrong = sized(causality, "1 2");
+        assert!(
+            wrong.len() == 1 && wrong[0].contains("2 start values for 3 elements"),
+            "{wrong:?}"
+        );
+    }
+}
+
+#[test]
+fn folders_and_licences_are_those_of_the_standard() {
+    let of = |names: &[&str]| -> Vec<String> {
+        let mut findings = Findings::default();
+        let names: Vec<String> = names.iter().map(|name| (*name).to_string()).collect();
+        archive::folders(&mut findings, &names);
+        archive::licences(&mut findings, &names);
+        let all = findings.findings.iter();
+        all.map(|own| format!("{} {}", own.severity, own.message))
+            .collect()
+    };
+    let sound = [
+        "modelDescription.xml",
+        "binaries/x/y.so",
+        "documentation/index.html",
+        "documentation/licenses/license.txt",
+        "extra/own/a.csv",
+    ];
+    assert_eq!(of(&sound), [""; 0]);
+    let without = |names: &[&str]| -> Vec<&str> {
+        let all = sound.iter().filter(|name| !names.contains(name));
+        all.copied().collect()
+    };
+    let library = "binaries/x/y.so";
+    let page = "documentation/index.html";
+    let licence = "documentation/licenses/license.txt";
+    let with = |mut names: Vec<&'static str>, more: &[&'static str]| {
+        names.extend(more);
+        of(&names)
+    };
+    // A folder that is empty is none.
+    let none = with(without(&[library]), &["binaries/"]);
+    assert_eq!(none, ["error there are neither binaries nor sources"]);
+    let sources = with(without(&[library]), &["sources/y.c"]);
+    assert_eq!(
+        sources,
+        ["warning there are only sources: importers must compile them"]
+    );
+    let start = with(without(&[page]), &["documentation/about.html"]);
+    assert_eq!(
+        start,
+        ["warning documentation/index.html, the start page, is missing"]
+    );
+    assert_eq!(
+        with(without(&[page]), &["documentation/_main.html"]),
+        [""; 0]
+    );
+    let both = of(&without(&[page, licence]));
+    assert_eq!(
+        both,
+        [
+            "note there is no documentation",
+            "note documentation/licenses contains no licence"
+        ]
+    );
+    let other = with(without(&[licence]), &["documentation/licenses/mit.md"]);
+    assert_eq!(
+        other,
+        ["note documentation/licenses has no license.txt, .html or .spdx"]
+    );
+    let empty = with(without(&[licence]), &["documentation/licenses/"]);
+    let lacks = "note documentation/licenses contains no licence".to_string();
+    assert_eq!(empty, [lacks, other[0].clone()]);
+    assert_eq!(with(without(&[licence]), &["licenses/mit.md"]), [""; 0]);
+    let strange = with(without(&[]), &["src/a.c", "src/b.c", "README"]);
+    assert_eq!(
+        strange,
+        [
+            "note `README` at the top is not part of the standard",
+            "note `src` at the top is not part of the standard"
+        ]
+    );
+}
+
+#[test]
+fn a_system_with_a_faulty_component_is_not_run() {
+    use std::io::Write as _;
+    let folder = tempfile::tempdir().unwrap();
+    let mut inner = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    inner.start_file(DESCRIPTION, options).unwrap();
+    inner.write_all(SECOND.as_bytes()).unwrap();
+    let fmu = inner.finish().unwrap().into_inner();
+    let system = r#"<ssd:SystemStructureDescription version="1.0" name="s"
+        xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"><ssd:System name="s"><ssd:Elements>
+        <ssd:Component name="a" type="application/x-fmu-sharedlibrary" source="resources/A.fmu"/>
+        </ssd:Elements></ssd:System></ssd:SystemStructureDescription>"#;
+    let path = folder.path().join("s.ssp");
+    let mut outer = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+    for (name, bytes) in [
+        ("SystemStructure.ssd", system.as_bytes()),
+        ("resources/A.fmu", &fmu),
+    ] {
+        outer.start_file(name, options).unwrap();
+        outer.write_all(bytes).unwrap();
+    }
+    outer.finish().unwrap();
+    let found = validate(&path, None).unwrap();
+    assert_eq!((found.kind, found.file.ends_with("s.ssp")), ("ssp", true));
+    let own = |finding: &&Finding| finding.message.contains("so the system was not run");
+    assert_eq!(
+        found.findings.iter().filter(own).count(),
+        1,
+        "{:?}",
+        found.findings
+    );
+    let place = "resources/A.fmu: archive";
+    assert!(
+        found.findings.iter().any(|own| own.place == place),
+        "{:?}",
+        found.findings
+    );
+}
+
+#[test]
+fn what_a_variable_is_and_how_it_begins_go_together() {
+    let of = |attributes: &str| {
+        let plain = r#"<Float64 name="y" valueReference="4" causality="output"/>"#;
+        let more = format!(r#"{plain}<Float64 name="q" valueReference="7" {attributes}/>"#);
+        found(&THIRD.replace(plain, &more))
+    };
+    for (attributes, is_sound) in [
+        (
+            r#"causality="calculatedParameter" variability="fixed" initial="exact" start="1""#,
+            false,
+        ),
+        (
+            r#"causality="parameter" variability="fixed" initial="exact" start="1""#,
+            true,
+        ),
+        (
+            r#"causality="parameter" variability="fixed" initial="calculated""#,
+            false,
+        ),
+        (
+            r#"causality="local" variability="constant" initial="exact" start="1""#,
+            true,
+        ),
+        (
+            r#"causality="local" variability="constant" initial="approx" start="1""#,
+            false,
+        ),
+        (r#"causality="input" initial="approx" start="1""#, false),
+    ] {
+        let all = of(attributes);
+        let refused = all
+            .iter()
+            .any(|line| line.contains("`q`: causality") && line.contains(" with initial "));
+        assert_eq!(!refused, is_sound, "{attributes}: {all:?}");
+    }
 }

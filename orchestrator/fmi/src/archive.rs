@@ -418,16 +418,106 @@ mod tests {
         }
     }
 
-    #[test]
-    fn entries_that_share_bytes_are_refused() {
+    /// An archive with these entries, each of 1000 bytes.
+    fn zipped(names: &[&str]) -> Vec<u8> {
         use std::io::Write;
         let mut writer = zip::ZipWriter::new(Cursor::new(Vec::new()));
         let options = zip::write::SimpleFileOptions::default();
-        for name in ["a.txt", "b.txt"] {
-            writer.start_file(name, options).unwrap();
+        for name in names {
+            writer.start_file(*name, options).unwrap();
             writer.write_all(&[7; 1000]).unwrap();
         }
-        let bytes = writer.finish().unwrap().into_inner();
+        writer.finish().unwrap().into_inner()
+    }
+
+    #[test]
+    fn a_file_that_is_no_archive_is_told_from_a_damaged_one() {
+        for (bytes, words) in [
+            (&b""[..], "the file is empty"),
+            (
+                b"PK\x03\x04 and no more",
+                "the zip archive is damaged or cut short",
+            ),
+            (b"text", "it is not a zip archive"),
+        ] {
+            let error = ZipArchive::new(Cursor::new(bytes)).err().unwrap();
+            assert!(unreadable(bytes, &error).starts_with(words));
+            let refused = unpack(FMU, Path::new("Own.fmu"), bytes).err().unwrap();
+            assert!(refused.to_string().contains(words), "{refused}");
+        }
+        let none = unpack(FMU, Path::new("Own.fmu"), &zipped(&["a.txt"]));
+        let refused = none.err().unwrap().to_string();
+        assert!(refused.ends_with("the archive has no modelDescription.xml at its top"));
+    }
+
+    #[test]
+    fn an_archive_that_claims_to_hold_too_much_is_not_unpacked() {
+        let claiming = |size: u32| {
+            let mut bytes = zipped(&["modelDescription.xml", "b.txt"]);
+            let entries = (0..bytes.len() - 4).filter(|&at| bytes[at..].starts_with(b"PK\x01\x02"));
+            let last = entries.max().unwrap();
+            bytes[last + 24..last + 28].copy_from_slice(&size.to_le_bytes());
+            let unpacked = unpack(FMU, Path::new("Own.fmu"), &bytes);
+            unpacked
+                .err()
+                .map_or(String::new(), |error| error.to_string())
+        };
+        let refusal = "it would unpack to 2048 MB, at most 2048 MB are accepted";
+        let least = u32::try_from(LARGEST).unwrap() - 1000;
+        assert!(claiming(least + 1).ends_with(refusal));
+        assert!(claiming(u32::MAX - 1).contains("it would unpack to 4096 MB"));
+        assert!(!claiming(least).contains("would unpack"));
+    }
+
+    #[test]
+    fn entries_that_would_be_written_elsewhere_are_refused() {
+        for (name, reason) in [
+            ("a/b.txt", None),
+            ("a..b/..c", None),
+            ("/a", Some("is an absolute path")),
+            ("C:a", Some("is an absolute path")),
+            ("a\\b", Some("has a backslash where zip archives have `/`")),
+            ("../a", Some("points outside the archive")),
+            ("a/../b", Some("points outside the archive")),
+            ("", Some("is not a file name")),
+            ("a\0b", Some("is not a file name")),
+        ] {
+            assert_eq!(refusal(name, false), reason, "{name}");
+            assert_eq!(refusal(name, true), Some("is a symbolic link"));
+        }
+    }
+
+    /// The header, and two segments of which the second ends last.
+    #[test]
+    fn a_library_that_ends_before_its_segments_is_cut_short() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("library");
+        let is_cut = |bytes: &[u8]| {
+            fs::write(&path, bytes).unwrap();
+            is_cut_short(&path).ok()
+        };
+        let mut file = vec![0_u8; 500];
+        file[..4].copy_from_slice(b"\x7fELF");
+        (file[0x20], file[0x38]) = (64, 2);
+        for (segment, offset, size) in [(64, 0, 100), (64 + 56, 300, 200)] {
+            let numbers = [(0x08, offset), (0x20, size)];
+            for (at, number) in numbers {
+                let number: u64 = number;
+                file[segment + at..segment + at + 8].copy_from_slice(&number.to_le_bytes());
+            }
+        }
+        assert_eq!(is_cut(&file), Some(false));
+        for length in [0, 63, 64, 64 + 2 * 56 - 1, 64 + 2 * 56, 499] {
+            assert_eq!(is_cut(&file[..length]), Some(true), "{length}");
+        }
+        // Another format is not looked into.
+        file[0] = b'M';
+        assert_eq!(is_cut(&file), Some(false));
+    }
+
+    #[test]
+    fn entries_that_share_bytes_are_refused() {
+        let bytes = zipped(&["a.txt", "b.txt"]);
         let mut sound = ZipArchive::new(Cursor::new(bytes.clone())).unwrap();
         assert!(check_overlaps(&mut sound).is_ok());
         // The second entry of the directory points to the first one's data.

@@ -231,3 +231,16 @@ pub fn digest(bytes: &[u8]) -> String {
 pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By FIPS 180-2, B.1.
+    #[test]
+    fn a_digest_is_sha_256_in_hexadecimal() {
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(digest(b"abc"), expected);
+        assert_eq!(hexadecimal(&[0, 10, 255]), "000aff");
+    }
+}

@@ -112,3 +112,19 @@ pub(super) fn refused(fmu: &Fmu, instance: &str, reason: impl Display) -> FmuErr
         reason,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_library_that_lacks_python_is_told_from_others() {
+        for (reason, lacks) in [
+            ("own.so: undefined symbol: PyFloat_Type", true),
+            ("own.so: undefined symbol: _Py_NoneStruct", true),
+            ("own.so: undefined symbol: sqrt", false),
+        ] {
+            assert_eq!(lacks_python(reason), lacks);
+        }
+    }
+}

@@ -10,12 +10,21 @@ use fmi_import::{Causality, FmiVersion, Fmu, Interface, Kind, Ticks, Variability
 use zip::{ZipWriter, write::SimpleFileOptions};
 
 fn opened(description: &str) -> Result<Arc<Fmu>, String> {
+    opened_with(description, &[])
+}
+
+/// As [`opened`], with further files.
+fn opened_with(description: &str, more: &[(&str, &str)]) -> Result<Arc<Fmu>, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("Own.fmu");
     let mut archive = ZipWriter::new(File::create(&path).unwrap());
     let options = SimpleFileOptions::default();
     archive.start_file("modelDescription.xml", options).unwrap();
     archive.write_all(description.as_bytes()).unwrap();
+    for (name, text) in more {
+        archive.start_file(*name, options).unwrap();
+        archive.write_all(text.as_bytes()).unwrap();
+    }
     archive.finish().unwrap();
     Fmu::open(&path).map_err(|error| error.to_string())
 }
@@ -287,4 +296,173 @@ fn descriptions_that_cannot_be_used_are_refused() {
     let many = size(r#"start="9000000000""#).unwrap();
     assert!(many.contains("elements"), "{many}");
     assert!(opened(&third("", "", "")).is_err());
+}
+
+#[test]
+fn names_of_outputs_are_known_with_their_aliases_and_only_tunable_parameters_can_be_tuned() {
+    let variables = r#"
+        <Float64 name="u" valueReference="1" causality="input" start="2"><Alias name="in"/></Float64>
+        <Float64 name="y" valueReference="2" causality="output"><Alias name="z"/><Alias name="out"/></Float64>
+        <Float64 name="a" valueReference="3" causality="output"><Dimension start="2"/><Alias name="b"/></Float64>
+        <Float64 name="p" valueReference="4" causality="parameter" variability="tunable" start="1"/>
+        <Float64 name="q" valueReference="5" causality="parameter" variability="fixed" start="1"/>
+        <Int32 name="n" valueReference="6" causality="parameter" variability="tunable" start="1"/>
+        <Float64 name="r" valueReference="7" causality="parameter" variability="tunable" start="1 2">
+            <Dimension start="2"/></Float64>"#;
+    let fmu = opened(&third(STEPS, variables, "")).unwrap();
+    let own = &fmu.description;
+    let aliases: Vec<(String, usize)> = own.output_aliases().collect();
+    let named = |name: &str, at| (name.to_string(), at);
+    assert_eq!(
+        aliases,
+        [
+            named("b[1]", 2),
+            named("b[2]", 3),
+            named("out", 1),
+            named("z", 1)
+        ]
+    );
+    assert_eq!((own.position("in"), own.array("b")), (Some(0), Some(2..4)));
+    let those = |is: fn(&fmi_import::Variable) -> bool| -> Vec<&str> {
+        let all = own.variables.iter().filter(|variable| is(variable));
+        all.map(|variable| &*variable.name).collect()
+    };
+    assert_eq!(
+        those(fmi_import::Variable::is_tunable),
+        ["p", "n", "r[1]", "r[2]"]
+    );
+    let numbers = ["u", "y", "p", "q"];
+    assert_eq!(those(fmi_import::Variable::is_real_number), numbers);
+}
+
+#[test]
+fn names_that_occur_twice_are_refused_with_their_places() {
+    let twice = r#"<Float64 name="y" valueReference="1"/><Float64 name="z" valueReference="2"/>
+        <Float64 name="y" valueReference="3"/>"#;
+    let refused = opened(&third(STEPS, twice, "")).unwrap_err();
+    assert!(
+        refused.contains("`y` occurs twice (as number 1 and 3)"),
+        "{refused}"
+    );
+    let alias = r#"<Float64 name="y" valueReference="1"/>
+        <Float64 name="z" valueReference="2"><Alias name="y"/></Float64>"#;
+    let refused = opened(&third(STEPS, alias, "")).unwrap_err();
+    assert!(
+        refused.contains("the alias `y` is also a variable"),
+        "{refused}"
+    );
+    let output = r#"<Output valueReference="7"/>"#;
+    let refused = opened(&third(STEPS, "", output)).unwrap_err();
+    assert!(
+        refused.contains("lists an output that is not among the variables"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn limits_of_short_numbers_are_read_as_those_of_long_ones() {
+    let variables = r#"
+        <Float32 name="a" valueReference="1" causality="input" start="0" min="-0.5" max="0.25"/>
+        <Float32 name="b" valueReference="2" causality="input" start="0" declaredType="Short" max="1"/>
+        <Int32 name="n" valueReference="3" causality="input" start="0" min="1" max="2"/>"#;
+    let text = third(STEPS, variables, "").replace(
+        "<TypeDefinitions>",
+        r#"<TypeDefinitions><Float32Type name="Short" unit="mm" min="-2" max="3"/>"#,
+    );
+    let fmu = opened(&text).unwrap();
+    let bounds = |name: &str| fmu.description.variable(name).unwrap().bounds;
+    assert_eq!(bounds("a"), [Some(-0.5), Some(0.25)]);
+    assert_eq!(bounds("b"), [Some(-2.0), Some(1.0)]);
+    assert_eq!(bounds("n"), [None; 2]);
+    let unit = fmu.description.variable("b").unwrap().unit.as_deref();
+    assert_eq!(unit, Some("mm"));
+}
+
+#[test]
+fn terminals_are_found_by_name_and_broken_ones_are_a_remark() {
+    let path = "terminalsAndIcons/terminalsAndIcons.xml";
+    let terminals = r#"<fmiTerminalsAndIcons><Terminals><Terminal name="a" matchingRule="bus"/>
+        <Terminal name="b" matchingRule="plug"/></Terminals></fmiTerminalsAndIcons>"#;
+    let fmu = opened_with(&third(STEPS, "", ""), &[(path, terminals)]).unwrap();
+    let rule = |name: &str| fmu.description.terminal(name).map(|own| own.rule.clone());
+    assert_eq!(rule("b"), Some(fmi_import::MatchingRule::Plug));
+    assert_eq!(
+        (rule("a"), rule("c")),
+        (Some(fmi_import::MatchingRule::Bus), None)
+    );
+    let fmu = opened_with(&third(STEPS, "", ""), &[(path, "<")]).unwrap();
+    let remark = "terminalsAndIcons.xml cannot be read";
+    assert!(fmu.description.terminals.is_empty());
+    assert!(
+        fmu.description
+            .remarks
+            .iter()
+            .any(|own| own.starts_with(remark))
+    );
+}
+
+#[test]
+fn versions_and_names_of_libraries_that_cannot_be_are_refused() {
+    let named = |name: &str| {
+        let steps = format!(r#"<CoSimulation modelIdentifier="{name}"/>"#);
+        opened(&third(&steps, "", "")).err()
+    };
+    for name in ["Own", "_own", "o", "Own_2"] {
+        assert_eq!(named(name), None);
+    }
+    for name in ["", "2Own", "Own-2", "../Own", "\u{e9}"] {
+        let refused = named(name).unwrap();
+        assert!(refused.contains("is not a C identifier"), "{refused}");
+    }
+    let of = |version: &str| {
+        let text = third(STEPS, "", "");
+        opened(&text.replace(r#"fmiVersion="3.0""#, version)).err()
+    };
+    assert_eq!(of(r#"fmiVersion="3.0.1""#), None);
+    let refused = of(r#"fmiVersion="4.0""#).unwrap();
+    assert!(refused.contains(r#"fmiVersion is "4.0""#), "{refused}");
+}
+
+#[test]
+fn a_run_is_as_long_as_from_its_start_to_its_stop() {
+    let of = |experiment: &str| {
+        let text = third(STEPS, "", "");
+        let known = r#"<DefaultExperiment startTime="0" stopTime="2.5" stepSize="0.125"/>"#;
+        let fmu = opened(&text.replace(known, experiment)).unwrap();
+        (fmu.description.default_stop, fmu.description.preferred_step)
+    };
+    assert_eq!(of(""), (None, None));
+    assert_eq!(
+        of(r#"<DefaultExperiment startTime="1" stopTime="3"/>"#),
+        (Some(2.0), None)
+    );
+    assert_eq!(
+        of(r#"<DefaultExperiment stopTime="3" stepSize="0"/>"#),
+        (Some(3.0), None)
+    );
+    assert_eq!(
+        of(r#"<DefaultExperiment startTime="3" stopTime="3"/>"#),
+        (None, None)
+    );
+}
+
+#[test]
+fn locals_become_outputs_with_their_whole_arrays() {
+    let variables = r#"<Float64 name="u" valueReference="1" causality="input" start="0"/>
+        <Float64 name="l" valueReference="2"/>
+        <Float64 name="a" valueReference="3"><Dimension start="3"/></Float64>
+        <Float64 name="m" valueReference="4"/>"#;
+    let fmu = opened(&third(STEPS, variables, "")).unwrap();
+    let outputs = |locals: &[usize]| -> Vec<usize> {
+        let own = fmu.with_outputs(locals);
+        let all: Vec<usize> = own.description.of(Causality::Output).collect();
+        let depends = all
+            .iter()
+            .all(|&at| *own.description.variables[at].dependencies == [0]);
+        assert!(depends);
+        all
+    };
+    // The second of three elements stands for all.
+    assert_eq!(outputs(&[3]), [2, 3, 4]);
+    assert_eq!(outputs(&[1, 5]), [1, 5]);
 }

@@ -121,3 +121,36 @@ pub(super) fn converged(
         change: (after - before).abs(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_converged_where_none_changes_by_more_than_rounding() {
+        let names = ["a", "b"].map(String::from);
+        let of =
+            |passes, last: [f64; 2], now: [f64; 2]| converged(0.5, passes, &last, &now, &names);
+        let close = [1.0, 1e6 * (1.0 + 0.9 * TOLERANCE)];
+        assert!(of(3, [1.0, 1e6], close).unwrap());
+        assert!(of(MOST_PASSES, [0.0, 0.0], [0.0, 0.0]).unwrap());
+        let far = [1.0, 1e6 * (1.0 + 3.0 * TOLERANCE)];
+        assert!(!of(MOST_PASSES - 1, [1.0, 1e6], far).unwrap());
+        assert!(!of(3, [0.0, 0.0], [1e-200, 0.0]).unwrap());
+        // The one that changes most is named.
+        let error = of(MOST_PASSES, [1.0, 2.0], [1.5, 3.0]).unwrap_err();
+        let MasterError::NotConverged {
+            time,
+            passes,
+            variable,
+            change,
+        } = error
+        else {
+            panic!("{error}");
+        };
+        assert_eq!(
+            (time, passes, &*variable, change),
+            (0.5, MOST_PASSES, "b", 1.0)
+        );
+    }
+}

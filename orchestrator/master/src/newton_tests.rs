@@ -120,3 +120,65 @@ fn derivatives_that_are_wrong_are_not_believed_twice() {
     assert_eq!(solve(&mut solver, &mut Wrong, &mut values).unwrap(), Ok(()));
     assert!((values[0] - 1.0 / 6.0).abs() < 1e-12);
 }
+
+#[test]
+fn what_does_not_settle_is_explained_by_how_a_change_comes_back() {
+    for (gain, is_singular, words) in [
+        (
+            Some(1.0 + 0.9e-3),
+            true,
+            "a change of the values returns at its full size",
+        ),
+        (Some(1.0 - 0.9e-3), true, "the loop gain is 1"),
+        (
+            Some(1.0 + 1.1e-3),
+            false,
+            "a change of the values returns 1.0011 times as large",
+        ),
+        (
+            Some(-3.0),
+            false,
+            "returns -3.0000 times as large, and Newton's method does not converge",
+        ),
+        (None, false, "after 17 iterations they still change"),
+    ] {
+        let unsolved = Unsolved {
+            passes: 17,
+            place: 0,
+            value: 0.0,
+            back: 1.0,
+            gain,
+        };
+        assert_eq!(unsolved.is_singular(), is_singular, "{gain:?}");
+        let reason = unsolved.reason();
+        assert!(
+            reason.starts_with(words) || reason.contains(words),
+            "{reason}"
+        );
+    }
+}
+
+#[test]
+fn the_gain_is_the_real_eigenvalue_next_to_one() {
+    let of = |rows: &[f64]| {
+        let n = (rows.len() as f64).sqrt() as usize;
+        gain(&DMatrix::from_row_slice(n, n, rows))
+    };
+    let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9;
+    // Eigenvalues 0.2 and 1.5; then 4 and -1.
+    assert!(near(of(&[0.2, 7.0, 0.0, 1.5]), 1.5));
+    assert!(near(of(&[1.5, 7.0, 0.0, 0.2]), 1.5));
+    assert!(near(of(&[1.0, 2.0, 3.0, 2.0]), -1.0));
+    // A rotation has none that is real.
+    assert_eq!(of(&[0.0, -1.0, 1.0, 0.0]), None);
+    assert_eq!(of(&[f64::NAN]), None);
+}
+
+#[test]
+fn whole_numbers_that_go_to_and_fro_are_not_found() {
+    let (_, solved, sent) = seek(|x, y| y[0] = 1.0 - x[0], &[0.0], &[false]);
+    let unsolved = solved.unwrap_err();
+    assert_eq!((unsolved.gain, unsolved.passes), (None, MOST_PASSES));
+    assert_eq!(sent, MOST_PASSES);
+    assert!((unsolved.back - unsolved.value).abs() == 1.0);
+}

@@ -137,3 +137,67 @@ impl Record {
         Some(self.rows().map(|row| row[place]).collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns besides the time, and one of whole numbers: `row` has 10 row + 1 and 10 row + 2.
+    fn record(rows: usize) -> Record {
+        let columns = ["time", "a", "b"].map(String::from).to_vec();
+        let mut record = Record::with_capacity(columns, rows).beside(&["n".to_string()]);
+        for row in 0..rows {
+            let first = 10.0 * row as f64;
+            let exact = [Datum::Signed(row as i64)];
+            record.push(row as f64, &[first + 1.0, first + 2.0], &exact);
+        }
+        record
+    }
+
+    #[test]
+    fn rows_have_a_value_for_each_column_and_are_found_from_any_on() {
+        let own = record(3);
+        assert_eq!((own.len(), own.is_empty()), (3, false));
+        assert_eq!(own.column("b"), Some(vec![2.0, 12.0, 22.0]));
+        assert_eq!(own.column("n"), None);
+        let (numbers, exact) = own.rows_from(1);
+        assert_eq!(numbers, [1.0, 11.0, 12.0, 2.0, 21.0, 22.0]);
+        assert_eq!(exact, [Datum::Signed(1), Datum::Signed(2)]);
+        assert_eq!(own.rows_from(4), (&[][..], &[][..]));
+        assert_eq!(own.exact(2), [Datum::Signed(2)]);
+        assert!(own.exact(3).is_empty() && Record::default().is_empty());
+    }
+
+    #[test]
+    fn a_record_is_put_together_of_its_parts() {
+        let whole = record(4);
+        let mut first = record(4);
+        first.truncate(2);
+        assert_eq!(first, record(2));
+        let (numbers, exact) = whole.rows_from(2);
+        let (columns, names) = (whole.columns.clone(), whole.exact_columns.clone());
+        let rest = Record::of(
+            columns.clone(),
+            numbers.to_vec(),
+            names.clone(),
+            exact.to_vec(),
+        );
+        first.append(&rest.unwrap());
+        assert_eq!(first, whole);
+        // Part of a row, and a value too few.
+        let part = Record::of(columns.clone(), vec![0.0; 4], names.clone(), Vec::new());
+        assert_eq!(part, None);
+        assert_eq!(Record::of(columns, vec![0.0; 3], names, Vec::new()), None);
+    }
+
+    #[test]
+    fn a_row_has_the_signals_that_are_kept_and_some_again() {
+        let mut own = Record::with_capacity(vec![String::new(); 5], 1);
+        own.push_with(0.5, &[1.0, 2.0, 3.0, 4.0], &[0..1, 2..4], &[1], &[]);
+        let rows: Vec<&[f64]> = own.rows().collect();
+        assert_eq!(rows, [[0.5, 1.0, 3.0, 4.0, 2.0]]);
+        own.add_column("more", &[7.0]);
+        assert_eq!(own.column("more"), Some(vec![7.0]));
+        assert_eq!(own.len(), 1);
+    }
+}

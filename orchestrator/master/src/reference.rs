@@ -187,3 +187,56 @@ impl Reference {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three histories of four samples that rest at 9 afterwards: 10, 11...; 20, 21...; 30, 31...
+    fn reference() -> Reference {
+        let history = |first: f64| Column {
+            values: (0..4).map(|at| first + f64::from(at)).collect(),
+            after: 9.0,
+        };
+        let samples = Samples {
+            period: 0.1,
+            columns: [10.0, 20.0, 30.0].map(history).to_vec(),
+        };
+        Reference::new(&samples, &[])
+    }
+
+    #[test]
+    fn signals_are_samples_ahead_and_behind_of_their_histories() {
+        let mut own = reference();
+        let taps = [
+            (Quantity::Displacement, 0),
+            (Quantity::Displacement, 1),
+            (Quantity::Displacement, 2),
+            (Quantity::Velocity, -1),
+            (Quantity::Acceleration, 0),
+        ];
+        for (at, (quantity, ahead)) in taps.into_iter().enumerate() {
+            assert_eq!(own.tap(quantity, ahead), at);
+        }
+        // One that is there already.
+        assert_eq!((own.tap(Quantity::Displacement, 1), own.len()), (1, 5));
+        assert_eq!(own.ahead_of_time(), Some(1));
+        let shifted: Vec<bool> = (0..6).map(|signal| own.is_shifted(signal)).collect();
+        assert_eq!(shifted, [false, true, true, true, false, false]);
+        for (sample, expected) in [
+            (0, [10.0, 11.0, 12.0, 0.0, 30.0]),
+            (1, [11.0, 12.0, 13.0, 20.0, 31.0]),
+            (3, [13.0, 9.0, 9.0, 22.0, 33.0]),
+            (5, [9.0, 9.0, 9.0, 9.0, 9.0]),
+        ] {
+            let mut signals = [f64::NAN; 5];
+            own.sample(sample, 0.1 * sample as f64, &mut signals);
+            assert_eq!(signals, expected, "{sample}");
+        }
+        own.take_from_outside();
+        own.set_now([1.0, 2.0, 3.0], "", &[]);
+        let mut signals = [f64::NAN; 5];
+        own.sample(2, 0.2, &mut signals);
+        assert_eq!(signals, [1.0, 1.0, 1.0, 2.0, 3.0]);
+    }
+}

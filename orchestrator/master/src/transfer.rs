@@ -557,3 +557,7 @@ impl Outputs {
         Ok(())
     }
 }
+
+#[cfg(test)]
+#[path = "transfer_tests.rs"]
+mod tests;

@@ -421,3 +421,96 @@ fn attempt(
     } = simulation;
     Ok(control.error(length, *algorithm, [last_signals, signals, next_signals]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of steps up to 16, the last of which was `last` long.
+    fn control(last: usize) -> StepControl {
+        let wanted = VariableStep {
+            tolerance: 0.01,
+            least: None,
+        };
+        let mut control = StepControl::new(&wanted, 16, vec![1], &[]);
+        control.progress.last = last;
+        control
+    }
+
+    fn signals(value: f64) -> Signals {
+        Signals {
+            numbers: vec![1e9, value],
+            exact: Vec::new(),
+        }
+    }
+
+    /// Of a parabola `t²` from `-before` to `length`, whose mean over the step is `length² / 3`.
+    #[test]
+    fn the_error_is_that_of_the_guess_of_a_parabola_s_mean() {
+        for (before, length) in [(3, 5), (8, 2), (4, 4)] {
+            let control = control(before);
+            let (b, l) = (before as f64, length as f64);
+            let all = [signals(b * b), signals(0.0), signals(l * l)];
+            let error = |algorithm| {
+                let (error, signal) = control.error(length, algorithm, [&all[0], &all[1], &all[2]]);
+                assert_eq!(signal, Some(1));
+                // Over the tolerance, of the largest size.
+                error * 0.01 * l * l
+            };
+            // Both ends for the mean, and as much again for holding it.
+            let held = 2.0 * (l * l / 2.0 - l * l / 3.0);
+            assert!((error(Algorithm::Iterative) - held).abs() < 1e-9);
+            // The line through the last two is at -b l / 2 in the middle, the mean of both ends at l² / 2.
+            let between = l * (b + l) / 2.0;
+            assert!((error(Algorithm::GaussSeidel) - between).abs() < 1e-9);
+        }
+        let none = control(2).error(2, Algorithm::GaussSeidel, [&signals(1.0); 3]);
+        assert_eq!(none, (0.0, None));
+        let [now, next] = [signals(1.0), signals(f64::NAN)];
+        let bad = control(2).error(2, Algorithm::GaussSeidel, [&now, &now, &next]);
+        assert_eq!(bad, (f64::INFINITY, Some(1)));
+    }
+
+    #[test]
+    fn steps_are_equal_and_end_with_the_greatest() {
+        let mut own = control(1);
+        for (tick, wanted, expected) in [
+            (0, 1.0, 1),
+            (0, 16.0, 16),
+            (0, 7.9, 6),
+            (6, 7.9, 5),
+            (12, 100.0, 4),
+            (31, 16.0, 1),
+            (32, 8.0, 8),
+        ] {
+            own.progress.wanted = wanted;
+            assert_eq!(own.length(tick), expected, "{tick} {wanted}");
+        }
+    }
+
+    #[test]
+    fn a_length_grows_with_small_errors_and_shrinks_with_large_ones() {
+        let mut own = control(0);
+        own.keep(4, (1e-9, Some(1)), false);
+        // Twice at most, and no more than before where it was repeated.
+        assert_eq!((own.progress.wanted, own.progress.last), (8.0, 4));
+        own.keep(4, (1e-9, Some(1)), true);
+        assert_eq!(own.progress.wanted, 4.0);
+        own.keep(8, (2.0, Some(0)), false);
+        let it = &own.progress;
+        assert!(it.wanted < 8.0 && it.over == 1 && it.made == 3);
+        assert_eq!((it.shortest, it.longest), (4, 8));
+        assert_eq!((it.worst, it.worst_signal), (2.0, Some(0)));
+        own.shorten(8, 4.0);
+        // 0.9 over the root of the error.
+        assert!((own.progress.wanted - 8.0 * 0.45).abs() < 1e-12);
+        own.shorten(8, f64::INFINITY);
+        assert_eq!((own.progress.wanted, own.progress.repeated), (1.0, 2));
+        let names = ["a", "b"].map(String::from);
+        let taken = own.taken(0.5, &names);
+        assert_eq!((taken.tolerance_percent, taken.worst_percent), (1.0, 2.0));
+        assert_eq!((taken.shortest_s, taken.longest_s), (2.0, 4.0));
+        assert_eq!((taken.least_s, taken.greatest_s), (0.5, 8.0));
+        assert_eq!(taken.worst_signal.as_deref(), Some("a"));
+    }
+}

@@ -11,7 +11,9 @@ use std::sync::Arc;
 
 use fmi_import::FmiVersion;
 use fmi_ssp::export::{Contents, Experiment, Player, Start, Supply, contents};
-use fmi_system::{Files, Hop, Passage, System, SystemFile, Transformation, Value, assemble};
+use fmi_system::{
+    Files, Hop, Passage, Setting, System, SystemFile, Transformation, Value, assemble,
+};
 use zip::{ZipWriter, write::SimpleFileOptions};
 
 fn zipped(path: &Path, files: &[(&str, &[u8])]) {
@@ -413,4 +415,238 @@ fn the_motion_of_an_own_archive_becomes_the_reference_and_another_component_give
             ]
         );
     }
+}
+
+#[test]
+fn an_experiment_is_the_same_after_it_was_an_archive() {
+    let folder = tempfile::tempdir().unwrap();
+    part(folder.path());
+    let guard = r#"<fmiModelDescription fmiVersion="3.0" modelName="Guard" instantiationToken="1">
+        <CoSimulation modelIdentifier="Guard"/><TypeDefinitions><EnumerationType name="Cause">
+        <Item name="none" value="0"/><Item name="far" value="1"/></EnumerationType></TypeDefinitions><ModelVariables>
+        <Boolean name="stop" valueReference="1" causality="input" variability="discrete" start="false"/>
+        <Boolean name="tripped" valueReference="2" causality="output" variability="discrete" initial="calculated"/>
+        <Enumeration name="why" declaredType="Cause" valueReference="3" causality="output" variability="discrete"
+        initial="calculated"/></ModelVariables>
+        <ModelStructure><Output valueReference="2"/><Output valueReference="3"/></ModelStructure>
+        </fmiModelDescription>"#;
+    zipped(
+        &folder.path().join("Guard.fmu"),
+        &[("modelDescription.xml", guard.as_bytes())],
+    );
+    let text = r#"connections = ["a.done -> guard.stop"]
+        [components.a]
+        fmu = "Part.fmu"
+        [components.guard]
+        fmu = "Guard.fmu"
+        period = "2 ms"
+        [experiment]
+        start = 1.5
+        end_when = "guard.tripped"
+        end_cause = "guard.why"
+        end_after = "0.5 s"
+        stop = "guard.stop"
+        "#;
+    let path = folder.path().join("pair.toml");
+    for (text, sampling) in [
+        (text.to_string(), Some(0.004)),
+        (text.split("[experiment]").next().unwrap().to_string(), None),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let before = assembled(&SystemFile::read(&path).unwrap());
+        let supply = Kept::default();
+        let experiment = Experiment {
+            supply: &supply,
+            sampling,
+            step: 0.002,
+            duration: 3.0,
+            algorithm: "gauss-seidel".to_string(),
+            fmi: FmiVersion::V3,
+        };
+        let out = folder.path().join("pair.ssp");
+        let written = contents(&before, &experiment, &out).unwrap();
+        let files = written.files.iter();
+        let files: Vec<(&str, &[u8])> = files.map(|(name, own)| (&**name, &**own)).collect();
+        zipped(&out, &files);
+        let read = fmi_ssp::read(&out.to_string_lossy()).unwrap();
+        let after = assembled(&read);
+        assert_eq!((after.end, after.stop), (before.end, before.stop));
+        assert_eq!(after.start, before.start);
+        let own = &read.experiment;
+        assert_eq!(own.algorithm.as_deref(), Some("gauss-seidel"));
+        assert_eq!(read.step().unwrap(), Some(0.002));
+        assert_eq!(read.duration().unwrap(), Some(3.0));
+        assert_eq!(own.sampling.is_some(), sampling.is_some());
+        let periods: Vec<_> = after.components.iter().map(|part| part.period).collect();
+        assert_eq!(periods, [None, Some(0.002)]);
+    }
+}
+
+/// A description with an experiment and a system `inner` within so many others.
+fn nested(depth: usize, experiment: &str, inner: &str) -> String {
+    let begins = (0..depth).map(|n| format!(r#"<ssd:System name="s{n}"><ssd:Elements>"#));
+    let ends = "</ssd:Elements></ssd:System>".repeat(depth);
+    format!(
+        r#"<ssd:SystemStructureDescription version="1.0" name="deep"
+        xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription">{}{inner}{ends}{experiment}
+        </ssd:SystemStructureDescription>"#,
+        begins.collect::<String>()
+    )
+}
+
+const ALONE: &str =
+    r#"<ssd:Component name="a" source="a.fmu" type="application/x-fmu-sharedlibrary"/>"#;
+
+fn of_text(text: &str) -> Result<SystemFile, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("SystemStructure.ssd");
+    std::fs::write(&path, text).unwrap();
+    fmi_ssp::read(&path.to_string_lossy()).map_err(|error| error.to_string())
+}
+
+#[test]
+fn systems_are_followed_to_a_depth_and_components_bear_their_names() {
+    let file = of_text(&nested(4, "", ALONE)).unwrap();
+    let names: Vec<&String> = file.components.keys().collect();
+    assert_eq!(names, ["s1.s2.s3.a"]);
+    // The outermost is at no depth.
+    assert!(of_text(&nested(33, "", ALONE)).is_ok());
+    let refused = of_text(&nested(34, "", ALONE)).unwrap_err();
+    assert!(refused.contains("nested deeper than 32"), "{refused}");
+}
+
+#[test]
+fn an_experiment_begins_and_is_as_long_as_from_its_start_to_its_stop() {
+    let of = |attributes: &str| {
+        let experiment = format!("<ssd:DefaultExperiment {attributes}/>");
+        let file = of_text(&nested(1, &experiment, ALONE))?;
+        Ok::<_, String>((file.experiment.start, file.duration().unwrap()))
+    };
+    assert_eq!(
+        of(r#"startTime="1.5" stopTime="4""#),
+        Ok((Some(1.5), Some(2.5)))
+    );
+    assert_eq!(of(r#"stopTime="4""#), Ok((None, Some(4.0))));
+    assert_eq!(of(r#"startTime="1.5""#), Ok((Some(1.5), None)));
+    let refused = of(r#"startTime="4" stopTime="4""#).unwrap_err();
+    let said = "the default experiment stops at 4 s, not after its start at 4 s";
+    assert!(refused.contains(said), "{refused}");
+}
+
+#[test]
+fn components_that_cannot_be_run_are_refused_with_their_reasons() {
+    let of = |attributes: &str| {
+        let component = format!(r#"<ssd:Component name="a" {attributes}/>"#);
+        of_text(&nested(1, "", &component)).map(|_| ())
+    };
+    let fmu = r#"type="application/x-fmu-sharedlibrary""#;
+    for (attributes, reason) in [
+        (
+            fmu.to_string(),
+            "`a`: it has no source, so there is nothing to run",
+        ),
+        (
+            r##"source="#other""##.to_string(),
+            "`a`: there is no system with the id `other`",
+        ),
+        (
+            r#"source="a.ssp" type="application/x-ssp-package""#.to_string(),
+            "`a.ssp` is an archive within the archive, which is not supported",
+        ),
+        (
+            r#"source="a.mo" type="text/x-modelica""#.to_string(),
+            "its type is `text/x-modelica`",
+        ),
+        (
+            format!(r#"source="a.fmu" {fmu} implementation="ScheduledExecution""#),
+            "scheduled execution is not supported",
+        ),
+    ] {
+        let refused = of(&attributes).unwrap_err();
+        assert!(refused.contains(reason), "{refused}");
+    }
+    assert_eq!(of(&format!(r#"source="a.fmu" {fmu}"#)), Ok(()));
+    assert_eq!(of(r#"source="a.fmu""#), Ok(()));
+    let other = r#"<ssd:SignalDictionaryReference name="bus" dictionary="wires"/>"#;
+    let refused = of_text(&nested(1, "", other)).unwrap_err();
+    assert!(
+        refused.contains("there is no signal dictionary `wires`"),
+        "{refused}"
+    );
+    let twice = of_text(&nested(1, "", &ALONE.repeat(2))).unwrap_err();
+    assert!(twice.contains("two elements are called `a`"), "{twice}");
+}
+
+#[test]
+fn a_description_of_any_name_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("own.ssd");
+    std::fs::write(&path, nested(1, "", ALONE)).unwrap();
+    let other = folder.path().join("SystemStructure.ssd");
+    std::fs::write(other, nested(1, "", &ALONE.replace("\"a\"", "\"b\""))).unwrap();
+    let file = fmi_ssp::read(&path.to_string_lossy()).unwrap();
+    assert!(file.components.contains_key("a") && file.components.len() == 1);
+}
+
+#[test]
+fn values_of_a_system_reach_its_components_by_their_names() {
+    let set = |parameters: &[(&str, f64)]| -> String {
+        let all = parameters.iter().map(|(name, value)| {
+            format!(r#"<ssv:Parameter name="{name}"><ssv:Real value="{value}"/></ssv:Parameter>"#)
+        });
+        format!(
+            r#"<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0"
+            name="set"><ssv:Parameters>{}</ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues>
+            </ssd:ParameterBinding></ssd:ParameterBindings>"#,
+            all.collect::<String>()
+        )
+    };
+    let component = |name: &str, bindings: &str| {
+        format!(
+            r#"<ssd:Component name="{name}" source="a.fmu" type="application/x-fmu-sharedlibrary">{bindings}
+            </ssd:Component>"#
+        )
+    };
+    let inner = format!(
+        r#"<ssd:System name="inner">{}<ssd:Elements>{}{}</ssd:Elements></ssd:System>{}"#,
+        set(&[("a.k", 1.0), ("b.k", 2.0)]),
+        component("a", &set(&[("k", 3.0), ("c", 4.0)])),
+        component("b", ""),
+        component("a", ""),
+    );
+    let text = nested(1, "", &inner)
+        .replacen(
+            r#"<ssd:System name="s0">"#,
+            &format!(
+                r#"<ssd:System name="s0">{}"#,
+                set(&[("inner.b.k", 5.0), ("a.k", 6.0), ("inner.b.m", 7.0)])
+            ),
+            1,
+        )
+        .replace(
+            "<ssd:SystemStructureDescription ",
+            r#"<ssd:SystemStructureDescription xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" "#,
+        );
+    let file = of_text(&text).unwrap();
+    let given = |component: &str| -> Vec<(String, f64)> {
+        let all = file.components[component].parameters.iter();
+        let number = |setting: &Setting| match setting {
+            Setting::Number(value) => *value,
+            Setting::Declared(own) => match own.value {
+                Setting::Number(value) => value,
+                _ => f64::NAN,
+            },
+            _ => f64::NAN,
+        };
+        all.map(|(name, own)| (name.clone(), number(own))).collect()
+    };
+    let named = |all: &[(&str, f64)]| -> Vec<(String, f64)> {
+        all.iter()
+            .map(|(name, value)| ((*name).to_string(), *value))
+            .collect()
+    };
+    // Values of a higher system go before those of a lower one.
+    assert_eq!(given("inner.a"), named(&[("c", 4.0), ("k", 1.0)]));
+    assert_eq!(given("inner.b"), named(&[("k", 5.0), ("m", 7.0)]));
+    assert_eq!(given("a"), named(&[("k", 6.0)]));
 }

@@ -3,6 +3,8 @@
 use toml::{Table, Value};
 
 use super::file::{ComponentFile, Stepping, SystemFile};
+use super::link::Link;
+use super::passage::Transformation;
 use super::value::Setting;
 
 impl Setting {
@@ -50,8 +52,7 @@ impl SystemFile {
         };
         text(&mut all, "name", &self.name);
         text(&mut all, "description", &self.description);
-        let links = self.connections.iter();
-        let links = links.map(|link| Value::String(link.to_string())).collect();
+        let links = self.connections.iter().map(connection).collect();
         all.insert("connections".into(), Value::Array(links));
         let components = self.components.iter();
         let components: Table = components
@@ -87,6 +88,27 @@ impl SystemFile {
         // Tables of texts and finite numbers alone are always TOML.
         toml::to_string_pretty(&all).unwrap_or_default()
     }
+}
+
+/// A connection, with what a system file can do to its value.
+fn connection(link: &Link) -> Value {
+    let plain = || Value::String(link.to_string());
+    let [hop] = link.way.hops.as_slice() else {
+        return plain();
+    };
+    let mut own = Table::new();
+    if let Transformation::Linear { factor, offset } = hop.transformation {
+        own.insert("factor".into(), Value::Float(factor));
+        own.insert("offset".into(), Value::Float(offset));
+    }
+    if hop.suppresses_units {
+        own.insert("convert_units".into(), Value::Boolean(false));
+    }
+    if own.is_empty() {
+        return plain();
+    }
+    own.insert("connect".into(), plain());
+    Value::Table(own)
 }
 
 fn written(component: &ComponentFile) -> Table {

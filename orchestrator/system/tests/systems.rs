@@ -22,6 +22,8 @@ fn pack(folder: &Path, name: &str, variables: &str, outputs: &str) {
         <Unit name="in"><BaseUnit m="1" factor="0.0254"/></Unit>
         <Unit name="mm"><BaseUnit m="1" factor="0.001"/></Unit>
         <Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit>
+        <Unit name="degF"><BaseUnit K="1" factor="0.5555555555555556" offset="255.3722222222222"/></Unit>
+        <Unit name="K"><BaseUnit K="1"/></Unit>
         </UnitDefinitions>
         <TypeDefinitions><EnumerationType name="Mode"><Item name="Slow" value="1"/><Item name="Fast" value="4"/>
         </EnumerationType></TypeDefinitions>
@@ -482,5 +484,112 @@ fn values_in_units_of_a_parameter_set_are_converted_before_they_are_read() {
             panic!("a number");
         };
         assert!((found - expected).abs() < 1e-9, "{written}: {found}");
+    }
+}
+
+#[test]
+fn whole_numbers_of_every_size_and_inputs_are_read_to_their_limits() {
+    let folder = folder();
+    let kinds = [
+        ("Int8", "-128", "127", "128"),
+        ("UInt16", "0", "65535", "65536"),
+        (
+            "Int64",
+            "-9223372036854775808",
+            "9223372036854775807",
+            "9223372036854775808",
+        ),
+        ("UInt64", "0", "18446744073709551615", "-1"),
+    ];
+    let variables = kinds.iter().zip(1..).map(|((kind, ..), n)| {
+        format!(
+            r#"<{kind} name="p{n}" valueReference="{n}" causality="parameter" variability="fixed" start="1"/>
+            <{kind} name="u{n}" valueReference="{n}0" causality="input" variability="discrete" start="1"/>"#
+        )
+    });
+    pack(folder.path(), "Whole", &variables.collect::<String>(), "");
+    let whole = "[components.body]\nfmu = \"Whole.fmu\"\n";
+    for ((kind, least, most, beyond), n) in kinds.iter().zip(1..) {
+        // Larger than TOML's own whole numbers, as a text.
+        let written = |value: &str| match *kind {
+            "Int64" | "UInt64" => format!("\"{value}\""),
+            _ => value.to_string(),
+        };
+        for value in [least, most] {
+            let text = format!(
+                "{whole}[components.body.parameters]\np{n} = {0}\n[components.body.inputs]\nu{n} = {0}\n",
+                written(value)
+            );
+            let system = read(folder.path(), &text, &[]).unwrap();
+            let expected = match *kind {
+                "Int64" => Value::Signed(value.parse().unwrap()),
+                "UInt64" => Value::Unsigned(value.parse().unwrap()),
+                _ => Value::Number(value.parse().unwrap()),
+            };
+            assert_eq!(given(&system, &format!("p{n}")), Some(expected.clone()));
+            assert_eq!(given(&system, &format!("u{n}")), Some(expected));
+        }
+        let text = format!(
+            "{whole}[components.body.parameters]\np{n} = {}\n",
+            written(beyond)
+        );
+        let refused = refusal(folder.path(), &text, &[]);
+        assert!(
+            refused.contains(&format!("a whole number from {least} to {most}")),
+            "{refused}"
+        );
+    }
+}
+
+#[test]
+fn names_that_mean_something_else_are_refused_for_components() {
+    let folder = folder();
+    for name in ["reference", "\"\"", "\"a.b\""] {
+        let text = ONE.replace("body", name);
+        let refused = refusal(folder.path(), &text, &[]);
+        let place = format!("rig.toml: components.{}: ", name.trim_matches('"'));
+        assert!(refused.starts_with(&place), "{refused}");
+    }
+    assert!(read(folder.path(), &ONE.replace("body", "Reference"), &[]).is_ok());
+}
+
+#[test]
+fn units_with_offsets_and_factors_are_converted_on_the_way() {
+    let folder = folder();
+    let units = [("warm", "degC"), ("hot", "degF"), ("cold", "K")];
+    let variables = |causality: &str, more: &str| -> String {
+        let all = units.iter().zip(1..).map(|((name, unit), n)| {
+            format!(r#"<Float64 name="{name}" valueReference="{n}" causality="{causality}" unit="{unit}" {more}/>"#)
+        });
+        all.collect()
+    };
+    let outputs = (1..4).map(|n| format!(r#"<Output valueReference="{n}" dependencies=""/>"#));
+    let outputs: String = outputs.collect();
+    pack(
+        folder.path(),
+        "Source",
+        &variables("output", r#"initial="calculated""#),
+        &outputs,
+    );
+    pack(
+        folder.path(),
+        "Sink",
+        &variables("input", r#"start="0""#),
+        "",
+    );
+    for (from, to, value, expected) in [
+        ("warm", "hot", 25.0, 77.0),
+        ("hot", "warm", 77.0, 25.0),
+        ("warm", "cold", 25.0, 298.15),
+        ("cold", "hot", 273.15, 32.0),
+        ("hot", "hot", 77.0, 77.0),
+    ] {
+        let text = format!(
+            "connections = [\"a.{from} -> b.{to}\"]\n[components.a]\nfmu = \"Source.fmu\"\n[components.b]\n\
+             fmu = \"Sink.fmu\"\n"
+        );
+        let system = read(folder.path(), &text, &[]).unwrap();
+        let found = system.connections[0].passage.of(value);
+        assert!((found - expected).abs() < 1e-9, "{from} -> {to}: {found}");
     }
 }

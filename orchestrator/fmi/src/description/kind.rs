@@ -150,4 +150,46 @@ mod tests {
         assert!(!Kind::Float64.drives(&choice(1)) && !Kind::String.drives(&choice(1)));
         assert!(Kind::Int16.drives(&Kind::Float64) && !Kind::Int64.drives(&Kind::Float64));
     }
+
+    #[test]
+    fn a_number_drives_every_type_that_holds_all_its_values() {
+        use Kind::{
+            Binary, Boolean, Clock, Float32, Float64, Int8, Int16, Int32, Int64, String, UInt8,
+            UInt16, UInt32, UInt64,
+        };
+        let all = [
+            Float64, Float32, Int8, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64, Boolean,
+            String, Binary, Clock,
+        ];
+        for (kind, driven) in [
+            (Float64, &[Float64, Float32][..]),
+            (Float32, &[Float64, Float32]),
+            (Int8, &[Float64, Float32, Int8, Int16, Int32, Int64]),
+            (
+                UInt8,
+                &[
+                    Float64, Float32, UInt8, Int16, UInt16, Int32, UInt32, Int64, UInt64,
+                ],
+            ),
+            (Int32, &[Float64, Int32, Int64]),
+            (UInt32, &[Float64, UInt32, Int64, UInt64]),
+            (Int64, &[Int64]),
+            (UInt64, &[UInt64]),
+            (Boolean, &[Boolean]),
+            (String, &[String]),
+            (Binary, &[Binary]),
+            (Clock, &[Clock]),
+        ] {
+            let found: Vec<&Kind> = all.iter().filter(|target| kind.drives(target)).collect();
+            let expected: Vec<&Kind> = driven.iter().collect();
+            assert_eq!(found, expected, "{kind:?}");
+        }
+        // As many values as bits say.
+        for (kind, bits) in [(Int8, 8), (UInt16, 16), (Int32, 32), (UInt64, 64)] {
+            let (least, most) = kind.whole_range().unwrap();
+            assert_eq!(most - least + 1, 1 << bits);
+        }
+        let without: Vec<&Kind> = all.iter().filter(|kind| !kind.has_values()).collect();
+        assert_eq!(without, [&Clock]);
+    }
 }

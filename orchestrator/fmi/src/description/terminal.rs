@@ -148,4 +148,30 @@ mod tests {
         assert_eq!(all[1].rule, MatchingRule::Other("org.other".to_string()));
         assert!(of("no text").is_err());
     }
+
+    #[test]
+    fn flows_and_rules_are_read_and_terminals_are_followed_to_a_depth() {
+        let member = |kind: &str| {
+            format!(r#"<TerminalMemberVariable variableName="{kind}" variableKind="{kind}"/>"#)
+        };
+        let kinds = ["inflow", "outflow", "signal"].map(member).concat();
+        let deep = (0..DEEPEST + 5).map(|_| r#"<Terminal name="t" matchingRule="bus">"#);
+        let ends = "</Terminal>".repeat(DEEPEST + 5);
+        let text = format!(
+            r#"<fmiTerminalsAndIcons><Terminals><Terminal name="a" matchingRule="sequence">{kinds}
+            <TerminalStreamMemberVariable/></Terminal>{}{ends}</Terminals></fmiTerminalsAndIcons>"#,
+            deep.collect::<String>()
+        );
+        let all = of(&text).unwrap();
+        let flows: Vec<Flow> = all[0].members.iter().map(|member| member.flow).collect();
+        assert_eq!(flows, [Flow::Inflow, Flow::Outflow, Flow::Signal]);
+        assert_eq!(all[0].members[1].name, "outflow");
+        assert!(all[0].has_streams && !all[1].has_streams);
+        assert_eq!(
+            (&all[0].rule, &all[1].rule),
+            (&MatchingRule::Sequence, &MatchingRule::Bus)
+        );
+        // The first one, and so many within it.
+        assert_eq!(all.len(), 1 + 1 + DEEPEST);
+    }
 }

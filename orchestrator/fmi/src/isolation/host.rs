@@ -375,3 +375,29 @@ fn how(status: ExitStatus) -> String {
         None => "ended its process".to_string(),
     }
 }
+
+#[cfg(unix)]
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::process::ExitStatusExt;
+
+    #[test]
+    fn the_end_of_a_process_is_told_by_its_signal_or_code() {
+        for (signal, name) in [
+            (libc::SIGSEGV, "segmentation fault"),
+            (libc::SIGABRT, "abort"),
+            (libc::SIGFPE, "division by zero or the like"),
+            (libc::SIGILL, "illegal instruction"),
+            (libc::SIGBUS, "bus error"),
+            (libc::SIGKILL, "killed"),
+            (libc::SIGTERM, "terminated"),
+            (libc::SIGHUP, "a signal"),
+        ] {
+            let expected = format!("ended its process ({name}, signal {signal})");
+            assert_eq!(how(ExitStatus::from_raw(signal)), expected);
+        }
+        let code = ExitStatus::from_raw(3 << 8);
+        assert_eq!(how(code), "ended its process by exit(3)");
+    }
+}

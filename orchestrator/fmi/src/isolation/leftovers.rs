@@ -83,3 +83,37 @@ fn marked(_mark: &Mark) -> Vec<libc::pid_t> {
 /// Elsewhere the guest alone is ended.
 #[cfg(not(unix))]
 pub(super) fn kill(_process: u32, _mark: &Mark) {}
+
+#[cfg(target_os = "linux")]
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::process::{CommandExt, ExitStatusExt};
+    use std::process::{Child, Command};
+
+    /// A process that sleeps in a group of its own, with this mark.
+    fn sleeping(mark: &Mark) -> Child {
+        let mut command = Command::new("sleep");
+        let command = command.arg("60").env(VARIABLE, mark.value());
+        command.process_group(0).spawn().unwrap()
+    }
+
+    #[test]
+    fn processes_that_bear_the_mark_are_ended_and_no_others() {
+        let (own, other) = (Mark::new(), Mark::new());
+        assert_ne!(own.value(), other.value());
+        let [mut first, mut second] = [&own, &other].map(sleeping);
+        // The environment is there once the program has begun.
+        while marked(&own).is_empty() || marked(&other).is_empty() {
+            std::thread::yield_now();
+        }
+        assert_eq!(marked(&own), [first.id().cast_signed()]);
+        // No group has this number.
+        kill(0, &own);
+        assert_eq!(first.wait().unwrap().signal(), Some(libc::SIGKILL));
+        assert!(second.try_wait().unwrap().is_none() && marked(&own).is_empty());
+        // A group ends whatever its members' marks are.
+        kill(second.id(), &own);
+        assert_eq!(second.wait().unwrap().signal(), Some(libc::SIGKILL));
+    }
+}

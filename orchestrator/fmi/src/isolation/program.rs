@@ -381,6 +381,29 @@ mod tests {
     }
 
     #[test]
+    fn a_call_of_another_function_or_of_other_variables_is_not_answered() {
+        let get = Function::Get(Scalar::Float64);
+        for (function, references, count, is_answered) in [
+            (get, &[7_u32][..], 1, true),
+            (Function::Get(Scalar::Int64), &[7], 1, false),
+            (get, &[8], 1, false),
+            (get, &[7, 7], 1, false),
+            (get, &[7], 2, false),
+        ] {
+            let mut program = chain(Linear::NOTHING);
+            let mut room = program.bytes().to_vec();
+            let last = guest(&mut room, &mut [1.5, 0.0, 0.0], usize::MAX);
+            program.take(&room, Some(last), None);
+            let mut values = vec![0.0; count];
+            let mut call = Call::plain(function);
+            (call.references, call.count) = (references, count);
+            call.values = Values::Out(cast_slice_mut(&mut values));
+            let answer = program.answer(0, &[], &mut call);
+            assert_eq!(matches!(answer, Answered::Yes(0)), is_answered);
+        }
+    }
+
+    #[test]
     fn a_program_that_nobody_uses_is_given_up() {
         let mut program = chain(Linear::NOTHING);
         for _ in 0..UNUSED {

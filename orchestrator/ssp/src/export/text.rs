@@ -50,3 +50,26 @@ pub(super) fn escape(text: &str) -> String {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_of_any_characters_are_attributes() {
+        for (text, expected) in [
+            ("plain \u{e9}", "plain \u{e9}"),
+            ("a & b < \"c\" > d", "a &amp; b &lt; &quot;c&quot; &gt; d"),
+            ("a\n\r\tb", "a&#10;&#13;&#9;b"),
+            ("\u{1}\u{7f}", "\u{fffd}\u{fffd}"),
+        ] {
+            assert_eq!(escape(text), expected);
+        }
+    }
+
+    #[test]
+    fn a_file_s_name_is_part_of_a_uri() {
+        assert_eq!(uri("A-b_c.1~2"), "A-b_c.1~2");
+        assert_eq!(uri("a b#c%d/e"), "a%20b%23c%25d%2Fe");
+    }
+}

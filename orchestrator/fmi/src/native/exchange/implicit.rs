@@ -382,6 +382,15 @@ mod tests {
     }
 
     #[test]
+    fn the_norm_is_the_largest_row_with_states_measured_by_their_sizes() {
+        // Columns of [[1, -2], [3, 4]]; sizes 1 and 10.
+        let jacobian = [1.0, 3.0, -2.0, 4.0];
+        assert_eq!(norm(&jacobian, &[1.0, 1.0]), 7.0);
+        assert_eq!(norm(&jacobian, &[1.0, 10.0]), 1.0 + 20.0);
+        assert_eq!(norm(&[], &[]), 0.0);
+    }
+
+    #[test]
     fn the_polynomial_passes_through_the_stages() {
         let stages = [0.3, -0.2, 0.7].map(|value| DVector::from_element(1, value));
         let polynomial = Collocation::of(&stages);

@@ -158,3 +158,75 @@ impl Model {
         Ok(matrix)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `x' = (x y, y - 3 x)` where x is not negative, with nominal values that are partly wrong.
+    struct Equations {
+        states: [f64; 2],
+        nominals: [f64; 2],
+    }
+
+    impl Endpoint for Equations {
+        fn call(&mut self, call: &mut Call) -> Result<i32, Lost> {
+            let [x, y] = self.states;
+            match (call.function, &mut call.values) {
+                (Function::SetContinuousStates, Values::In(bytes)) => {
+                    self.states.copy_from_slice(cast_slice(bytes));
+                }
+                (Function::GetDerivatives, Values::Out(_)) if x < 0.0 => return Ok(DISCARD),
+                (Function::GetDerivatives, Values::Out(bytes)) => {
+                    cast_slice_mut(bytes).copy_from_slice(&[x * y, y - 3.0 * x]);
+                }
+                (Function::GetNominals, Values::Out(bytes)) => {
+                    cast_slice_mut(bytes).copy_from_slice(&self.nominals);
+                }
+                _ => {}
+            }
+            Ok(0)
+        }
+    }
+
+    fn model(nominals: [f64; 2]) -> Model {
+        let states = [0.0; 2];
+        Model {
+            fmu: Box::new(Equations { states, nominals }),
+            pairs: Vec::new(),
+            nominals: Vec::new(),
+            tolerance: 1e-6,
+        }
+    }
+
+    #[test]
+    fn a_nominal_value_that_is_no_size_counts_as_one() {
+        for (given, expected) in [
+            ([-2.0, 3.0], [2.0, 3.0]),
+            ([0.0, f64::NAN], [1.0, 1.0]),
+            ([f64::INFINITY, 0.5], [1.0, 0.5]),
+        ] {
+            let mut model = model(given);
+            model.read_nominals(2);
+            assert_eq!(model.nominals, expected);
+            assert_eq!(model.size(0, -0.25, 0.125), FLOOR * expected[0] + 0.25);
+        }
+    }
+
+    #[test]
+    fn the_jacobian_is_that_of_the_equations_also_at_the_edge_of_where_they_hold() {
+        let mut model = model([1.0; 2]);
+        model.read_nominals(2);
+        for states in [[2.0, 5.0], [0.0, -4.0]] {
+            let [x, y] = states;
+            let slope = [x * y, y - 3.0 * x];
+            let found = model.jacobian(0.0, &states, &slope).unwrap_or_default();
+            // Column after column.
+            for (found, expected) in found.iter().zip([y, -3.0, x, 1.0]) {
+                // Rounding of slopes of size 4 over a step of 1.5e-11.
+                assert!((found - expected).abs() < 1e-4, "{found} {expected}");
+            }
+            assert_eq!(found.len(), 4);
+        }
+    }
+}
