@@ -22,7 +22,7 @@ pub const FLOOR: f64 = 0.6;
 pub(super) const NOISE_IS_KNOWN_TO: f64 = 0.004;
 /// Least share of an effect's gain that the records must contribute; the rest comes from the stated parameters.
 /// Without the error of a scale, for one, the parameters would be far off and the records would look the same.
-const BY_THE_RECORDS: f64 = 0.5;
+const BY_THE_RECORDS: f64 = 0.3;
 /// A model within this of the best is a rival that the data do not rule out: odds of `e^6`, 400 to
 /// one, against it; above 10 is "very strong" (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995).
 pub const RIVAL_WITHIN: f64 = 12.0;

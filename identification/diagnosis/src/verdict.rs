@@ -434,12 +434,9 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
             let mut selection = PenalisedLikelihood::of(model, self.records, self.observer);
             selection.floor = floor;
             let mut level = selection.extensions(current);
-            let gain = |own: &Hypothesis| current.score - own.score;
-            let pays = |own: &Hypothesis| pays(model.candidates(), own, current);
-            let best = level.first().map_or(0.0, gain);
-            // What a noise of another form may have gained hides nothing that pays for sure.
-            level.retain(|own| gain(own) > NEAR * best || pays(own));
-            level.sort_by_key(|own| !pays(own));
+            let gains: Vec<f64> = level.iter().map(|own| current.score - own.score).collect();
+            let best = gains.first().copied().unwrap_or_default();
+            level.truncate(gains.iter().filter(|gain| **gain > NEAR * best).count());
             let most = PROPOSED.saturating_sub(current.effects().len()).max(1);
             let level = level.into_iter().map(|own| own.fit.point);
             level.take(most).collect()
