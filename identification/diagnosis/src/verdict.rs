@@ -493,20 +493,20 @@ fn weigh<M: ExtensibleModel>(
     let nominal = selection.nominal()?;
     let best = found.hypothesis.clone();
     let named = !best.fit.point.effects.is_empty();
-    let others = rivals.iter().take(CANDIDATES).filter_map(|rival| {
+    // Fits from two starts may end at one model, which is not its own rival.
+    let mut known = vec![best.effects()];
+    let others = rivals.iter().take(CANDIDATES).filter(|rival| {
+        let set = rival.effects();
+        let is_new = !known.contains(&set);
+        known.push(set);
+        is_new
+    });
+    let others = others.filter_map(|rival| {
         let start = evaluate(model, &rival.fit.point, fitted)?;
         Some(Hypothesis {
             score: rival.score,
             ..selection.hypothesis(&start)?
         })
-    });
-    // Fits from two starts may end at one model, which is not its own rival.
-    let mut known = vec![best.effects()];
-    let others = others.filter(|own| {
-        let set = own.effects();
-        let is_new = !known.contains(&set);
-        known.push(set);
-        is_new
     });
     let others: Vec<Hypothesis> = others.collect();
     let nominal_square = nominal.mean_square();

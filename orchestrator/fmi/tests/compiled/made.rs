@@ -126,20 +126,23 @@ pub fn packed(description: &str, library: &[u8]) -> Arc<Fmu> {
 
 /// Writes an FMU with `more` files.
 pub fn pack(path: &Path, description: &str, library: &[u8], more: &[(&str, &str)]) {
+    // Folders of both versions.
+    let platforms = [fmi_rs::fmi2::PLATFORM, fmi_rs::fmi3::native::PLATFORM_TUPLE];
+    let extension = fmi_rs::SHARED_LIBRARY_EXTENSION;
+    let libraries = platforms.map(|own| format!("binaries/{own}/minimal{extension}"));
+    let mut files = vec![("modelDescription.xml", description.as_bytes())];
+    files.extend(libraries.iter().map(|name| (name.as_str(), library)));
+    files.extend(more.iter().map(|(name, text)| (*name, text.as_bytes())));
+    write(path, &files);
+}
+
+/// Writes an archive of named files.
+pub fn write(path: &Path, files: &[(&str, &[u8])]) {
     let mut archive = ZipWriter::new(File::create(path).unwrap());
     let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
-    let mut add = |name: &str, bytes: &[u8]| {
-        archive.start_file(name, options).unwrap();
+    for (name, bytes) in files {
+        archive.start_file(*name, options).unwrap();
         archive.write_all(bytes).unwrap();
-    };
-    add("modelDescription.xml", description.as_bytes());
-    // Folders of both versions.
-    for platform in [fmi_rs::fmi2::PLATFORM, fmi_rs::fmi3::native::PLATFORM_TUPLE] {
-        let extension = fmi_rs::SHARED_LIBRARY_EXTENSION;
-        add(&format!("binaries/{platform}/minimal{extension}"), library);
-    }
-    for (name, text) in more {
-        add(name, text.as_bytes());
     }
     archive.finish().unwrap();
 }

@@ -2,15 +2,14 @@
 
 use std::collections::HashMap;
 use std::error::Error;
-use std::fs::File;
-use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
 use fmi_import::{Behaviour, BehaviourError, Fmu, Options};
 use fmi_master::{Outcome, Pace, Plan, Samples, Simulation};
 use fmi_system::{Library, SystemFile, assemble};
-use zip::{ZipWriter, write::SimpleFileOptions};
+
+use super::made;
 
 pub const STEP: f64 = 0.1;
 pub const RATE: f64 = 0.5;
@@ -33,71 +32,77 @@ fn described(folder: &Path, name: &str, start: &str) -> Fmu {
 /// An FMU of this description.
 fn opened(folder: &Path, name: &str, text: &str) -> Fmu {
     let path = folder.join(format!("{name}.fmu"));
-    let mut archive = ZipWriter::new(File::create(&path).unwrap());
-    archive
-        .start_file("modelDescription.xml", SimpleFileOptions::default())
-        .unwrap();
-    archive.write_all(text.as_bytes()).unwrap();
-    archive.finish().unwrap();
+    made::write(&path, &[("modelDescription.xml", text.as_bytes())]);
     Arc::unwrap_or_clone(Fmu::open(&path).unwrap())
 }
 
-/// `y + step gain u`, with `u` in mm; it fails where it would pass `limit`.
-struct Integrator {
-    y: f64,
-    gain: f64,
-    limit: f64,
+/// What a component does: time, step, inputs, own state and outputs.
+pub type Equations = fn(f64, f64, &[f64], &mut [f64], &mut [f64]);
+
+/// As [`Equations`], of a component that may fail.
+type Law =
+    dyn Fn(f64, f64, &[f64], &mut [f64], &mut [f64]) -> Result<(), BehaviourError> + Send + Sync;
+
+/// A component with numbers for its state.
+struct Own {
+    state: Vec<f64>,
+    law: Arc<Law>,
 }
 
-impl Behaviour for Integrator {
+impl Behaviour for Own {
     fn step(
         &mut self,
-        _: f64,
+        time: f64,
         step: f64,
         inputs: &[f64],
         outputs: &mut [f64],
     ) -> Result<(), BehaviourError> {
-        let next = self.y + step * self.gain * 1e-3 * inputs[0];
-        if next.abs() > self.limit {
-            return Err(format!("leaves its limit of {} m", self.limit).into());
-        }
-        self.y = next;
-        outputs[0] = self.y;
-        Ok(())
+        (self.law)(time, step, inputs, &mut self.state, outputs)
     }
 
     fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
-        Ok(self.y.to_le_bytes().to_vec())
+        let all = self.state.iter();
+        Ok(all.flat_map(|one| one.to_le_bytes()).collect())
     }
 
     fn restore(&mut self, state: &[u8]) -> Result<(), BehaviourError> {
-        self.y = f64::from_le_bytes(state.try_into().map_err(|_| "has another state")?);
+        for (own, bytes) in self.state.iter_mut().zip(state.chunks_exact(8)) {
+            *own = f64::from_le_bytes(bytes.try_into().map_err(|_| "has another state")?);
+        }
         Ok(())
     }
 }
 
-/// `-RATE u` at every sample, with `u` in mm.
-struct Law;
+/// Instances that begin with `state`.
+fn begin(state: &[f64], law: Arc<Law>) -> Arc<fmi_import::Begin> {
+    let state = state.to_vec();
+    Arc::new(move |_: &str| {
+        let (state, law) = (state.clone(), law.clone());
+        Ok(Box::new(Own { state, law }) as Box<dyn Behaviour>)
+    })
+}
 
-impl Behaviour for Law {
-    fn step(
-        &mut self,
-        _: f64,
-        _: f64,
-        inputs: &[f64],
-        outputs: &mut [f64],
-    ) -> Result<(), BehaviourError> {
+/// `y + step gain u`, with `u` in mm; it fails where it would pass `limit`.
+fn integrator(y: f64, gain: f64, limit: f64) -> Arc<fmi_import::Begin> {
+    let law: Arc<Law> = Arc::new(move |_, step, inputs, state, outputs| {
+        let next = state[0] + step * gain * 1e-3 * inputs[0];
+        if next.abs() > limit {
+            return Err(format!("leaves its limit of {limit} m").into());
+        }
+        state[0] = next;
+        outputs[0] = next;
+        Ok(())
+    });
+    begin(&[y], law)
+}
+
+/// `-RATE u` at every sample, with `u` in mm.
+fn law() -> Arc<fmi_import::Begin> {
+    let law: Arc<Law> = Arc::new(|_, _, inputs, _, outputs| {
         outputs[0] = -RATE * 1e-3 * inputs[0];
         Ok(())
-    }
-
-    fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
-        Ok(Vec::new())
-    }
-
-    fn restore(&mut self, _: &[u8]) -> Result<(), BehaviourError> {
-        Ok(())
-    }
+    });
+    begin(&[], law)
 }
 
 pub struct Parts(pub HashMap<&'static str, Arc<Fmu>>);
@@ -113,33 +118,16 @@ impl Library for Parts {
 
 pub fn parts(limit: f64) -> Parts {
     let folder = tempfile::tempdir().unwrap();
-    let integrator = move |y: f64, gain: f64| -> Arc<fmi_import::Begin> {
-        Arc::new(move |_: &str| Ok(Box::new(Integrator { y, gain, limit }) as Box<dyn Behaviour>))
+    let of = |name: &'static str, start: &str, is_sampled: bool, begin| {
+        let fmu = described(folder.path(), name, start).computed_by(&[], is_sampled, begin);
+        (name, Arc::new(fmu))
     };
-    let law: Arc<fmi_import::Begin> = Arc::new(|_: &str| Ok(Box::new(Law) as Box<dyn Behaviour>));
-    let folder = folder.path();
-    Parts(HashMap::from([
-        (
-            "Body",
-            Arc::new(described(folder, "Body", "1").computed_by(&[], false, integrator(1.0, 1.0))),
-        ),
-        (
-            "Rest",
-            Arc::new(described(folder, "Rest", "0").computed_by(&[], false, integrator(0.0, 1.0))),
-        ),
-        (
-            "Back",
-            Arc::new(described(folder, "Back", "0").computed_by(
-                &[],
-                false,
-                integrator(0.0, -RATE),
-            )),
-        ),
-        (
-            "Law",
-            Arc::new(described(folder, "Law", "0").computed_by(&[], true, law)),
-        ),
-    ]))
+    named(vec![
+        of("Body", "1", false, integrator(1.0, 1.0, limit)),
+        of("Rest", "0", false, integrator(0.0, 1.0, limit)),
+        of("Back", "0", false, integrator(0.0, -RATE, limit)),
+        of("Law", "0", true, law()),
+    ])
 }
 
 /// The simulation of a system that its text describes.
@@ -153,47 +141,8 @@ pub fn run(text: &str, parts: &mut Parts, samples: &Samples, plan: &Plan, rows: 
     planned(text, parts, samples, plan).run(rows, Pace::Fastest, &mut |_| {})
 }
 
-/// What a component does: time, step, inputs, own state and outputs.
-pub type Equations = fn(f64, f64, &[f64], &mut [f64], &mut [f64]);
-
-/// A component with numbers for its state; it fails where an output is not a number.
-struct Own {
-    state: Vec<f64>,
-    equations: Equations,
-}
-
-impl Behaviour for Own {
-    fn step(
-        &mut self,
-        time: f64,
-        step: f64,
-        inputs: &[f64],
-        outputs: &mut [f64],
-    ) -> Result<(), BehaviourError> {
-        (self.equations)(time, step, inputs, &mut self.state, outputs);
-        match outputs.iter().any(|value| value.is_nan()) {
-            true => Err("has no value".into()),
-            false => Ok(()),
-        }
-    }
-
-    fn save(&mut self) -> Result<Vec<u8>, BehaviourError> {
-        Ok(self
-            .state
-            .iter()
-            .flat_map(|one| one.to_le_bytes())
-            .collect())
-    }
-
-    fn restore(&mut self, state: &[u8]) -> Result<(), BehaviourError> {
-        for (own, bytes) in self.state.iter_mut().zip(state.chunks_exact(8)) {
-            *own = f64::from_le_bytes(bytes.try_into().map_err(|_| "has another state")?);
-        }
-        Ok(())
-    }
-}
-
-/// A component with these variables (FMI 3.0), attributes of its interface, and state.
+/// A component with these variables (FMI 3.0), attributes of its interface, and state; it fails where an output is not a
+/// number.
 pub fn own(
     variables: &str,
     attributes: &str,
@@ -209,12 +158,14 @@ pub fn own(
     );
     let folder = tempfile::tempdir().unwrap();
     let fmu = opened(folder.path(), "Own", &text);
-    let state = state.to_vec();
-    let begin = move |_: &str| {
-        let state = state.clone();
-        Ok(Box::new(Own { state, equations }) as Box<dyn Behaviour>)
-    };
-    Arc::new(fmu.computed_by(&[], is_sampled, Arc::new(begin)))
+    let law: Arc<Law> = Arc::new(move |time, step, inputs, state, outputs| {
+        equations(time, step, inputs, state, outputs);
+        match outputs.iter().any(|value| value.is_nan()) {
+            true => Err("has no value".into()),
+            false => Ok(()),
+        }
+    });
+    Arc::new(fmu.computed_by(&[], is_sampled, begin(state, law)))
 }
 
 /// Named components.
