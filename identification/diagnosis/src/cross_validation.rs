@@ -328,8 +328,9 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         named.then_some(current)
     }
 
-    /// The end of a search that begins from `found`, or from it without one of its effects, if it pays as an effect
-    /// must: what was taken while others were missing may replace them. The last look backward is that at `found`.
+    /// The end of a search that begins from `found`, from it with an effect in the place of one that it looks like, or
+    /// without one of its effects, if it pays as an effect must: what was taken while others were missing may replace
+    /// them. The last look backward is that at `found`.
     fn exchanged(&mut self, found: &Simulated) -> Option<Simulated> {
         let mut best = found.clone();
         let mut is_other = false;
@@ -338,9 +339,11 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             let without = std::mem::take(&mut self.without).into_iter();
             let own = best.point.effects.iter().map(|(i, _)| Some(*i));
             let mut starts: Vec<(Option<usize>, Simulated)> = own.zip(without).collect();
+            let better = self.with_look_alikes(&best, &starts);
             starts.sort_by(|a, b| a.1.squares.total_cmp(&b.1.squares));
             starts.truncate(EXCHANGED);
-            starts.insert(0, (None, best.clone()));
+            let whole = [best.clone()].into_iter().chain(better);
+            starts.splice(0..0, whole.map(|start| (None, start)));
             for (gone, start) in starts {
                 if gone.is_some_and(|gone| !tried.insert(gone)) {
                     continue;
@@ -358,6 +361,26 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             break;
         }
         is_other.then_some(best)
+    }
+
+    /// The models that fit better than `best` by an effect in the place of one that it looks like; `without` are those
+    /// that lack an effect.
+    fn with_look_alikes(
+        &self,
+        best: &Simulated,
+        without: &[(Option<usize>, Simulated)],
+    ) -> Vec<Simulated> {
+        let candidates = self.model.candidates();
+        let swapped = without.iter().filter_map(|(gone, start)| {
+            let alike = candidates[(*gone)?].look_alikes;
+            let others = 0..candidates.len();
+            let others = others.filter(|&i| alike.contains(&candidates[i].effect));
+            self.fitted(start, &others.collect::<Vec<_>>())
+        });
+        let models = swapped.flatten().map(|(_, model)| model);
+        models
+            .filter(|model| model.squares < best.squares)
+            .collect()
     }
 
     /// What a search from `start` ends with.

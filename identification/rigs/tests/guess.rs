@@ -121,21 +121,24 @@ fn a_voltage_and_a_position_are_an_axis_beside_a_reference_without_a_unit() {
 #[test]
 fn long_records_are_reduced_further_and_the_rate_they_were_recorded_at_is_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let period = |rows: u32| {
+    let period = |rows: u32, step: f64| {
         let mut text = String::from("time [s],command [mm],displacement [mm]\n");
         for k in 0..rows {
             let x = (0.02 * f64::from(k)).sin();
-            writeln!(text, "{:.3},{x:.4},{x:.4}", 0.004 * f64::from(k)).unwrap();
+            writeln!(text, "{:.3},{x:.4},{x:.4}", step * f64::from(k)).unwrap();
         }
         let file = folder.path().join(format!("{rows}.csv"));
         std::fs::write(&file, text).unwrap();
         let guessed = guess(&[file], None).unwrap();
         let one = &guessed.measurement.recordings[0];
-        assert!((one.recorded_period - 0.004).abs() < 1e-9);
+        assert!((one.recorded_period - step).abs() < 1e-9);
         one.period()
     };
-    assert!((period(19_000) - 0.004).abs() < 1e-9);
-    assert!((period(21_000) - 0.008).abs() < 1e-9);
+    assert!((period(19_000, 0.004) - 0.004).abs() < 1e-9);
+    assert!((period(21_000, 0.004) - 0.008).abs() < 1e-9);
+    // No slower than they must be for 20,000 samples, nor than 100 Hz.
+    assert!((period(53_000, 0.002) - 0.006).abs() < 1e-9);
+    assert!((period(130_000, 0.002) - 0.010).abs() < 1e-9);
 }
 
 #[test]

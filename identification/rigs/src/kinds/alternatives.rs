@@ -126,7 +126,8 @@ pub(super) fn of_its_class<M: InParts>(
     own.map(|rival| (rival.point, rival.crossed)).collect()
 }
 
-/// The effects of the class of `own` that the model at `point` does not have, the most common first.
+/// The effects of the class of `own` that the model at `point` does not have, the most common first: those that it
+/// lists or that list it.
 pub(super) fn alike<'a, M: InParts>(
     measured: &'a M,
     point: &'a Point,
@@ -134,7 +135,7 @@ pub(super) fn alike<'a, M: InParts>(
 ) -> impl Iterator<Item = usize> + 'a {
     let known = |i: usize| point.effects.iter().any(|(known, _)| *known == i);
     let all = 0..measured.candidates().len();
-    all.filter(move |&i| !known(i) && measured.are_alike(i, own))
+    all.filter(move |&i| !known(i) && (measured.are_alike(i, own) || measured.are_alike(own, i)))
 }
 
 /// The model at `point` with `other` in the place of one of its effects, from the nearest of its starts; none where it
@@ -270,4 +271,39 @@ pub(super) fn least_needed<M: InParts>(
             .total_cmp(&crossed.likelier_than(&a.2))
     })?;
     Some((left, errors))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::super::measured::Measured;
+    use super::super::{Measurement, of_kind};
+    use super::*;
+
+    #[test]
+    fn an_effect_stands_in_for_one_that_it_does_not_list_but_that_lists_it() {
+        let rig = of_kind("closed_loop_actuator").unwrap();
+        let nominal = rig.parameters().iter().map(|_| (0.0, 0.0)).collect();
+        let measurement = Measurement {
+            recordings: Vec::new(),
+        };
+        let measured = Measured::new(rig, &measurement, nominal);
+        let place = |name: &str| measured.index(name).unwrap();
+        let [band, bristles] = ["dead_band", "bristle_friction"].map(place);
+        assert!(!measured.are_alike(band, bristles) && measured.are_alike(bristles, band));
+        let others = |own: usize, effects: &[usize]| {
+            let effects = effects.iter().map(|i| (*i, Vec::new())).collect();
+            let point = Point {
+                effects,
+                ..Point::default()
+            };
+            let all = alike(&measured, &point, own).map(|i| measured.name(i));
+            all.collect::<Vec<_>>()
+        };
+        for (own, other) in [(bristles, "dead_band"), (band, "bristle_friction")] {
+            let found = others(own, &[own]);
+            assert!(found.iter().any(|name| name == other), "{found:?}");
+        }
+        assert!(!others(bristles, &[bristles, band]).contains(&"dead_band".to_owned()));
+    }
 }

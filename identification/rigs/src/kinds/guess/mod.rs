@@ -30,7 +30,7 @@ pub struct Guess {
 /// Least sampling rate of a test of motion, Hz: slower ones are times in another unit.
 pub const SLOWEST: f64 = 8.0;
 
-/// Sampling rate that is enough for a table's motion, Hz, and that for long records of more samples than these.
+/// Sampling rate that is enough for a table's motion, Hz, and the least for records of more samples than these.
 const ENOUGH: f64 = 200.0;
 const LONG: usize = 20_000;
 const ENOUGH_OF_LONG: f64 = 100.0;
@@ -109,10 +109,7 @@ pub fn guess(files: &[PathBuf], columns: Option<&Path>) -> Result<Guess, Descrip
     let rig = of_kind(kind).ok_or_else(|| wrong(first, format!("unknown kind {kind}")))?;
     check_rate(first, &measurement)?;
     let nominal = nominal(rig, &measurement);
-    let samples = measurement.recordings.iter().map(RigRecording::len);
-    if samples.sum::<usize>() > LONG {
-        guessing.rate = ENOUGH_OF_LONG;
-    }
+    guessing.rate = rate_of(&measurement);
     let text = guessing.text(&nominal);
     let description = Description::parse(&place, &text)?;
     let measurement = description.measurement(&[])?;
@@ -336,6 +333,22 @@ pub type Start = (&'static str, f64, f64, &'static str);
 pub fn begun(description: &Description) -> Result<Vec<Start>, DescriptionError> {
     let measurement = description.measurement(&[])?;
     Ok(nominal(description.rig()?, &measurement))
+}
+
+/// The rate towards which records that are reduced to [`ENOUGH`] are to be reduced, Hz: the highest that leaves
+/// [`LONG`] samples, since a delay is read less exactly from slower ones.
+fn rate_of(measurement: &Measurement) -> f64 {
+    let samples: usize = measurement.recordings.iter().map(RigRecording::len).sum();
+    let fastest = measurement.recordings.iter();
+    let fastest = fastest.min_by(|a, b| a.period().total_cmp(&b.period()));
+    match fastest {
+        Some(own) if samples > LONG => {
+            let share = samples as f64 / LONG as f64;
+            let means = (share * own.period() / own.recorded_period).ceil();
+            (1.0 / (means * own.recorded_period)).max(ENOUGH_OF_LONG)
+        }
+        _ => ENOUGH,
+    }
 }
 
 impl Guessing<'_> {
