@@ -1035,4 +1035,34 @@ mod tests {
         let mut sizes = found.point.effects.iter().map(|(_, q)| q[0]);
         assert!(sizes.all(|size| (size - 1.0).abs() < 0.01), "{found:?}");
     }
+
+    /// A strong wave 0 and the weak ones 1 and 2; the wave 3 is nearly the strong one.
+    fn like_a_strong_wave(point: &Point, half: usize, k: usize) -> f64 {
+        let k = half * SAMPLES + k;
+        let t = k as f64 / 10.0;
+        let [strong, second, third, apart] =
+            [1.0, 1.9, 3.1, 4.3].map(|frequency| (frequency * t + frequency).sin());
+        let waves = [strong, second, third, strong + 0.1 * apart];
+        let found = point.effects.iter().map(|(i, q)| q[0] * waves[*i]);
+        let noise = 1e-3 * (37.0 * k as f64).sin();
+        5.0 * strong + second + third + noise - point.nuisance[0] - found.sum::<f64>()
+    }
+
+    #[test]
+    fn the_strongest_effect_is_exchanged_for_one_that_it_looks_like() {
+        let mut model = Halves::new(&["strong", "second", "third", "like"], like_a_strong_wave);
+        let start = Point {
+            nuisance: vec![0.0],
+            effects: vec![(3, vec![4.9]), (1, vec![0.9]), (2, vec![0.9])],
+        };
+        let effects = |model: &Halves| {
+            let start = [start.clone()];
+            let (_, found) = select_jointly(model, &start, 2, Observer::none()).unwrap();
+            let all = found.map(|found| found.point.effects.into_iter().map(|(i, _)| i));
+            all.map(Iterator::collect::<BTreeSet<usize>>)
+        };
+        model.candidates[0].look_alikes = &["like"];
+        model.candidates[3].look_alikes = &["strong"];
+        assert_eq!(effects(&model), Some(BTreeSet::from([0, 1, 2])));
+    }
 }
