@@ -181,7 +181,7 @@ fn ask(
 
 fn has_word(added: Added, name: &Value) -> bool {
     let name = name.as_str().unwrap_or_default();
-    added.words().iter().any(|word| name.contains(word))
+    added.words().iter().any(|word| name.contains(word)) && !added.others().contains(&name)
 }
 
 /// The number of a parameter under `key`, in `unit`.

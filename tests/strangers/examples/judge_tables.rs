@@ -2,11 +2,12 @@
 //!
 //! `cargo run --release -p strangers --example judge_tables -- [--cases N] [--seed S] [--kind
 //! nothing|one|two|outside] [--shard I/N] [--program FILE] [--limit SECONDS] [--records DIR] [--from DIR]
-//! [--out DIR] [--keep DIR]`
+//! [--out DIR] [--keep DIR] [--ablate yes]`
 //!
 //! Of the cases a quarter hide nothing, nine in twenty one effect, a fifth two and a tenth something outside
 //! the catalogue. `--from` judges the cases that a folder has (`cases`, `truth`); `--keep` writes the drawn ones
-//! there and diagnoses none. With `--out` results are kept, and only cases that are missing are diagnosed.
+//! there and diagnoses none. `--ablate` compares the printed gain of a single effect with an ablation by hand, which
+//! takes minutes a case. With `--out` results are kept, and only cases that are missing are diagnosed.
 
 use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
@@ -16,6 +17,7 @@ use std::process::ExitCode;
 
 use strangers::judge::Judge;
 use strangers::options::Options;
+use strangers::table::ablation::by_hand;
 use strangers::table::case::{Case, Kind, Truth};
 use strangers::table::score::{Judged, table};
 
@@ -61,6 +63,7 @@ fn diagnose(judge: &Judge, folder: &Path, truth: Truth, scratch: &Path) -> Resul
 fn run() -> Result<(), String> {
     let options = Options::read(&[
         "cases", "seed", "kind", "shard", "program", "limit", "records", "from", "out", "keep",
+        "ablate",
     ])?;
     let judge = options.judge(180)?;
     let (cases, seed) = (options.number("cases", 20)?, options.number("seed", 1)?);
@@ -155,7 +158,17 @@ fn run() -> Result<(), String> {
             }
             let folder = scratch.join(&case.truth.case).join("case");
             case.write(&folder).map_err(failed(&folder))?;
-            keep(&diagnose(&judge, &folder, case.truth, &scratch)?)?;
+            let mut judged = diagnose(&judge, &folder, case.truth.clone(), &scratch)?;
+            let is_asked = options.text("ablate").is_some() && case.truth.kind == Kind::One;
+            if is_asked && judged.names.iter().any(|name| name.is_there) {
+                judged.by_hand = by_hand(&case);
+                eprintln!(
+                    "    printed {:?}, by hand {:?}",
+                    judged.names.first().and_then(|name| name.gain),
+                    judged.by_hand
+                );
+            }
+            keep(&judged)?;
             fs::remove_dir_all(&folder).map_err(failed(&folder))?;
         }
     }

@@ -32,6 +32,14 @@ impl Added {
         }
     }
 
+    /// Names that have such a part and say something else.
+    pub fn others(self) -> &'static [&'static str] {
+        match self {
+            Self::Gain(_) => &["asymmetric_gain", "reduced_null_gain", "loop_gain"],
+            _ => &[],
+        }
+    }
+
     /// Its size and, for what has the column's unit, `None` as unit.
     pub fn size(self) -> (f64, Option<&'static str>) {
         match self {

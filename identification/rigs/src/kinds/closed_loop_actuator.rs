@@ -126,7 +126,15 @@ effects! {
     /// Transducer: y = x (1 + c x).
     sensor_curvature: SensorCurvature {
         curvature: size("1/m", 3e-3, (-0.3, 0.3)),
-    } from [[5e-3], [-5e-3]];
+    } from [[5e-3], [-5e-3]], like ["sensor_asymmetry"];
+    /// Transducer of two halves, as the coils of a differential transformer: y = x (1 + a sgn x).
+    sensor_asymmetry: SensorAsymmetry {
+        asymmetry: size("1", 3e-3, (-0.5, 0.5)),
+    } from [[0.02], [-0.02]], like ["sensor_curvature"];
+    /// Transducer that is worn around its middle: y = x - b sgn x beyond |x| > b.
+    sensor_dead_band: SensorDeadBand {
+        half_width: size("m", 5e-3, (0.0, 1.0)),
+    } from [[0.03]];
     /// Transducer linkage: y follows x only beyond a gap.
     free_play: FreePlay {
         gap: size("m", 5e-3, (0.0, 1.0)),
@@ -312,6 +320,8 @@ impl Equations for ClosedLoopActuator {
             flow_saturation: FlowSaturation { compression },
             speed_limit: SpeedLimit { slowness, fed_back },
             sensor_curvature: SensorCurvature { curvature },
+            sensor_asymmetry: SensorAsymmetry { asymmetry: halves },
+            sensor_dead_band: SensorDeadBand { half_width: unseen },
             free_play: FreePlay { gap },
             shared_disturbance: SharedDisturbance { coupling },
         } = *effects;
@@ -400,7 +410,8 @@ impl Equations for ClosedLoopActuator {
             let x = state[1];
             // Not `clamp`, which panics where a model has left the finite.
             shown = shown.max(x - 0.5 * gap).min(x + 0.5 * gap);
-            *y = shown * (1.0 + curvature * shown) + session.zero;
+            let seen = (shown.abs() - unseen).max(0.0).copysign(shown);
+            *y = seen * (1.0 + curvature * seen) + halves * seen.abs() + session.zero;
             if coupling != 0.0 {
                 *y += coupling * (command[k] - clean[k]);
             }
@@ -542,6 +553,36 @@ mod tests {
         assert!(last(0.0, 5.0, 0.0, 0.0).abs() < 1e-6);
         let slow = last(0.0, 0.0, 2.0, 0.0);
         assert!((slow - 0.5 * ramp[n - 1]).abs() < 0.01, "{slow}");
+    }
+
+    #[test]
+    fn a_transducer_shows_its_halves_and_not_its_middle() {
+        // So slowly that the table is where it is sent to.
+        let (rate, n) = (100.0, 4000);
+        let wave: Vec<f64> = (0..n).map(|k| (1e-3 * k as f64).sin()).collect();
+        let shown = |asymmetry: f64, half_width: f64| {
+            let effects = Effects {
+                sensor_asymmetry: SensorAsymmetry { asymmetry },
+                sensor_dead_band: SensorDeadBand { half_width },
+                ..Effects::off().unwrap()
+            };
+            answer(rate, &wave, &proportional(1e3), &effects)
+        };
+        for (asymmetry, half_width) in
+            [(0.0, 0.0), (0.1, 0.0), (-0.05, 0.0), (0.0, 0.2), (0.1, 0.2)]
+        {
+            for (y, x) in shown(asymmetry, half_width).iter().zip(&wave) {
+                let exact = match x {
+                    x if *x > half_width => (1.0 + asymmetry) * (x - half_width),
+                    x if *x < -half_width => (1.0 - asymmetry) * (x + half_width),
+                    _ => 0.0,
+                };
+                assert!(
+                    (y - exact).abs() < 3e-4,
+                    "{asymmetry} {half_width}: {y} {exact}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -242,6 +242,10 @@ pub struct Case {
     pub records: Vec<(String, String)>,
     /// What is hidden.
     pub truth: Truth,
+    /// That, and the laws of the rig, to simulate it again.
+    pub hidden: Hidden,
+    /// See there.
+    pub laws: Laws,
 }
 
 impl Case {
@@ -319,6 +323,8 @@ impl Case {
                 world: Some(world),
                 records: names,
             },
+            hidden: drawn.hidden,
+            laws,
         })
     }
 

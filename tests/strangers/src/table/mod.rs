@@ -1,5 +1,6 @@
 //! The thesis's table in worlds of another form.
 
+pub mod ablation;
 pub mod case;
 pub mod hidden;
 pub mod rig;

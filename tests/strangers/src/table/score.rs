@@ -55,6 +55,9 @@ pub struct Judged {
     pub seconds: f64,
     /// The first sentence, or the complaint.
     pub sentence: String,
+    /// Error without what is hidden over error with it, by hand.
+    #[serde(default)]
+    pub by_hand: Option<f64>,
 }
 
 /// Friction, yielding, play and droop have laws that differ from the catalogue's.
@@ -129,6 +132,7 @@ impl Judged {
             truth,
             seconds: answer.seconds,
             sentence,
+            by_hand: None,
         }
     }
 }
@@ -187,6 +191,17 @@ fn estimates(truth: &Truth, json: &Value) -> Vec<Estimate> {
         }
     }
     estimates
+}
+
+impl Judged {
+    /// The printed gain of the one effect that is hidden and named over that by hand.
+    pub fn printed_by_hand(&self) -> Option<f64> {
+        let [name] = &self.names[..] else {
+            return None;
+        };
+        let is_one = self.truth.kind == Kind::One && name.is_there;
+        is_one.then_some(name.gain? / self.by_hand?)
+    }
 }
 
 fn gain(json: &Value, name: &str) -> Option<f64> {
@@ -264,6 +279,15 @@ pub fn table(judged: &[Judged]) -> String {
             median.map_or("none".into(), |median| {
                 format!("{median:.2} in the median of {}", gains.len())
             }),
+        );
+    }
+    let both: Vec<f64> = judged.iter().filter_map(Judged::printed_by_hand).collect();
+    if !both.is_empty() {
+        let near = both.iter().filter(|ratio| (*ratio - 1.0).abs() <= 0.1);
+        row(
+            "printed gain within 10 % of that by hand",
+            "100 %",
+            share(near.count(), both.len()),
         );
     }
     let ranked: Vec<bool> = judged
