@@ -328,9 +328,9 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         named.then_some(current)
     }
 
-    /// The end of a search that begins from `found`, from it with an effect in the place of one that it looks like, or
-    /// without one of its effects, if it pays as an effect must: what was taken while others were missing may replace
-    /// them. The last look backward is that at `found`.
+    /// The end of a search that begins from `found`, if it pays as an effect must: what was taken while others were
+    /// missing may replace them. It also begins without one of the effects, and with another one in the place of one that
+    /// it looks like. The last look backward is that at `found`.
     fn exchanged(&mut self, found: &Simulated) -> Option<Simulated> {
         let mut best = found.clone();
         let mut is_other = false;
