@@ -7,6 +7,7 @@
 //! effect; what was named before and is no longer is lost. A record's own delay or zero may be too small to be said
 //! without an effect and is part of what is said with one: it is what is said of another addition, less that.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -181,7 +182,8 @@ fn ask(
 
 fn has_word(added: Added, name: &Value) -> bool {
     let name = name.as_str().unwrap_or_default();
-    added.words().iter().any(|word| name.contains(word)) && !added.others().contains(&name)
+    let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
+    has(added.words()) && !has(added.others())
 }
 
 /// The number of a parameter under `key`, in `unit`.
@@ -300,16 +302,18 @@ fn run() -> Result<(), String> {
         let (size, unit) = added.size();
         let unit = unit.unwrap_or(rig.unit);
         let kind = added.words()[0];
-        if !owned.contains_key(&(rig.rig, kind)) {
-            let ask = |added| {
-                let place = folder(format!("{kind}-{seed}"));
-                ask(&judge, rig, Some(added), &place, &options)
-            };
-            let own = own(rig, before, (added, unit), &mut Dice::new(seed, 81), ask)?;
-            println!("{} has {:.2e} {unit} of {kind} of its own", rig.rig, own.0);
-            owned.insert((rig.rig, kind), own);
-        }
-        let already = owned[&(rig.rig, kind)];
+        let already = match owned.entry((rig.rig, kind)) {
+            Entry::Occupied(own) => *own.get(),
+            Entry::Vacant(place) => {
+                let ask = |added| {
+                    let place = folder(format!("{kind}-{seed}"));
+                    ask(&judge, rig, Some(added), &place, &options)
+                };
+                let own = own(rig, before, (added, unit), &mut Dice::new(seed, 81), ask)?;
+                println!("{} has {:.2e} {unit} of {kind} of its own", rig.rig, own.0);
+                *place.insert(own)
+            }
+        };
         let (later, perhaps) = (said(&after, added, unit), ranked(&after, added, unit));
         let is_said = later.iter().any(|value| *value != already);
         let is_held = |values: &[(f64, f64)]| {

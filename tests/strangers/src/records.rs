@@ -32,10 +32,10 @@ impl Added {
         }
     }
 
-    /// Names that have such a part and say something else.
+    /// Parts of the names that say something else with one of these words.
     pub fn others(self) -> &'static [&'static str] {
         match self {
-            Self::Gain(_) => &["asymmetric_gain", "reduced_null_gain", "loop_gain"],
+            Self::Gain(_) => &["asymmetr", "null", "loop"],
             _ => &[],
         }
     }

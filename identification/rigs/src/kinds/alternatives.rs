@@ -279,6 +279,7 @@ mod tests {
     use super::super::measured::Measured;
     use super::super::{Measurement, of_kind};
     use super::*;
+    use units::vocabulary;
 
     #[test]
     fn an_effect_stands_in_for_one_that_it_does_not_list_but_that_lists_it() {
@@ -289,7 +290,7 @@ mod tests {
         };
         let measured = Measured::new(rig, &measurement, nominal);
         let place = |name: &str| measured.index(name).unwrap();
-        let [band, bristles] = ["dead_band", "bristle_friction"].map(place);
+        let [band, bristles] = [vocabulary::DEAD_BAND, "bristle_friction"].map(place);
         assert!(!measured.are_alike(band, bristles) && measured.are_alike(bristles, band));
         let others = |own: usize, effects: &[usize]| {
             let effects = effects.iter().map(|i| (*i, Vec::new())).collect();
@@ -300,10 +301,13 @@ mod tests {
             let all = alike(&measured, &point, own).map(|i| measured.name(i));
             all.collect::<Vec<_>>()
         };
-        for (own, other) in [(bristles, "dead_band"), (band, "bristle_friction")] {
+        for (own, other) in [
+            (bristles, vocabulary::DEAD_BAND),
+            (band, "bristle_friction"),
+        ] {
             let found = others(own, &[own]);
             assert!(found.iter().any(|name| name == other), "{found:?}");
         }
-        assert!(!others(bristles, &[bristles, band]).contains(&"dead_band".to_owned()));
+        assert!(!others(bristles, &[bristles, band]).contains(&vocabulary::DEAD_BAND.to_owned()));
     }
 }
