@@ -356,3 +356,43 @@ pub fn by_hand(case: &Case) -> Option<f64> {
     let gain = error(&without, &other) / error(&with, &plant);
     gain.is_finite().then_some(gain)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_autoregression_leaves_white_noise_of_variance_one() {
+        // A swing that all channels share, and noise of each.
+        let mut dice = crate::dice::Dice::new(1, 83);
+        let (mut swing, mut before) = (0.0f64, 0.0f64);
+        let rows: Vec<Row> = (0..6000)
+            .map(|_| {
+                (swing, before) = (1.9 * swing - 0.95 * before + 0.1 * dice.gauss(), swing);
+                std::array::from_fn(|i| (1.0 + i as f64) * (swing + 0.2 * dice.gauss()))
+            })
+            .collect();
+        let noise = Noise::of(&[rows[..3000].to_vec()], [1.0, 2.0, 3.0, 4.0]).unwrap();
+        let white = noise.whitened(&rows[3000..]);
+        let n = white.len() as f64;
+        for i in 0..CHANNELS {
+            for j in 0..=i {
+                let mean = white.iter().map(|row| row[i] * row[j]).sum::<f64>() / n;
+                let expected = f64::from(u8::from(i == j));
+                assert!((mean - expected).abs() < 0.15, "{i} {j}: {mean}");
+            }
+            let next = white.windows(2).map(|w| w[0][i] * w[1][i]).sum::<f64>() / n;
+            assert!(next.abs() < 0.1, "{i}: {next}");
+        }
+    }
+
+    #[test]
+    fn equations_are_solved_and_singular_ones_are_not() {
+        let m = vec![vec![0.0, 2.0], vec![3.0, 1.0]];
+        assert_eq!(solved(m, vec![4.0, 5.0]), Some(vec![1.0, 2.0]));
+        assert_eq!(
+            solved(vec![vec![1.0, 2.0], vec![2.0, 4.0]], vec![1.0, 1.0]),
+            None
+        );
+    }
+}
