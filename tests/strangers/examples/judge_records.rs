@@ -180,8 +180,7 @@ fn ask(
     Ok(json)
 }
 
-fn has_word(added: Added, name: &Value) -> bool {
-    let name = name.as_str().unwrap_or_default();
+fn has_word(added: Added, name: &str) -> bool {
     let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
     has(added.words()) && !has(added.others())
 }
@@ -191,10 +190,15 @@ fn number(parameter: &Value, key: &str, unit: &str) -> Option<f64> {
     units::convert(parameter[key].as_f64()?, parameter["unit"].as_str()?, unit).ok()
 }
 
+/// The value of a parameter with its standard error, in `unit`.
+fn estimate(parameter: &Value, unit: &str) -> Option<(f64, f64)> {
+    let number = |key: &str| number(parameter, key, unit);
+    Some((number("value")?, number("standard_error")?))
+}
+
 /// Every value of an effect or a found parameter whose name says it, with its standard error, in `unit`.
 fn said(json: &Value, added: Added, unit: &str) -> Vec<(f64, f64)> {
-    let has_word = |name: &Value| has_word(added, name);
-    let number = |p: &Value, key: &str| number(p, key, unit);
+    let has_word = |name: &Value| has_word(added, name.as_str().unwrap_or_default());
     let effects = json["effects"]
         .as_array()
         .into_iter()
@@ -203,18 +207,16 @@ fn said(json: &Value, added: Added, unit: &str) -> Vec<(f64, f64)> {
     let parameters = effects
         .filter_map(|e| e["parameters"].as_object())
         .flat_map(|p| p.values());
-    let values =
-        parameters.filter_map(|p| Some((number(p, "value")?, number(p, "standard_error")?)));
+    let values = parameters.filter_map(|p| estimate(p, unit));
     let findings = json["findings"]
         .as_array()
         .into_iter()
         .flatten()
         .filter(|f| has_word(&f["parameter"]));
     let found = findings.filter_map(|f| {
-        Some((
-            number(f, "found")? - number(f, "stated")?,
-            number(f, "standard_error")?,
-        ))
+        let number = |key: &str| number(f, key, unit);
+        let off = number("found")? - number("stated")?;
+        Some((off, number("standard_error")?))
     });
     values.chain(found).collect()
 }
@@ -225,13 +227,8 @@ fn ranked(json: &Value, added: Added, unit: &str) -> Vec<(f64, f64)> {
     let parameters = candidates.filter_map(|candidate| candidate["parameters"].as_object());
     parameters
         .flatten()
-        .filter(|(name, _)| has_word(added, &Value::from(name.as_str())))
-        .filter_map(|(_, p)| {
-            Some((
-                number(p, "value", unit)?,
-                number(p, "standard_error", unit)?,
-            ))
-        })
+        .filter(|(name, _)| has_word(added, name))
+        .filter_map(|(_, p)| estimate(p, unit))
         .collect()
 }
 

@@ -159,14 +159,11 @@ fn run() -> Result<(), String> {
             let folder = scratch.join(&case.truth.case).join("case");
             case.write(&folder).map_err(failed(&folder))?;
             let mut judged = diagnose(&judge, &folder, case.truth.clone(), &scratch)?;
-            let is_asked = options.text("ablate").is_some() && case.truth.kind == Kind::One;
-            if is_asked && judged.names.iter().any(|name| name.is_there) {
+            if options.text("ablate").is_some()
+                && let Some(printed) = judged.only_name().map(|name| name.gain)
+            {
                 judged.by_hand = by_hand(&case);
-                eprintln!(
-                    "    printed {:?}, by hand {:?}",
-                    judged.names.first().and_then(|name| name.gain),
-                    judged.by_hand
-                );
+                eprintln!("    printed {printed:?}, by hand {:?}", judged.by_hand);
             }
             keep(&judged)?;
             fs::remove_dir_all(&folder).map_err(failed(&folder))?;

@@ -242,9 +242,9 @@ pub struct Case {
     pub records: Vec<(String, String)>,
     /// What is hidden.
     pub truth: Truth,
-    /// That, and the laws of the rig, to simulate it again.
+    /// The same as the rig has it.
     pub hidden: Hidden,
-    /// See there.
+    /// The laws of the rig.
     pub laws: Laws,
 }
 

@@ -194,13 +194,17 @@ fn estimates(truth: &Truth, json: &Value) -> Vec<Estimate> {
 }
 
 impl Judged {
-    /// The printed gain of the one effect that is hidden and named over that by hand.
-    pub fn printed_by_hand(&self) -> Option<f64> {
+    /// The only name, where it is that of the only effect that is hidden.
+    pub fn only_name(&self) -> Option<&Name> {
         let [name] = &self.names[..] else {
             return None;
         };
-        let is_one = self.truth.kind == Kind::One && name.is_there;
-        is_one.then_some(name.gain? / self.by_hand?)
+        (self.truth.kind == Kind::One && name.is_there).then_some(name)
+    }
+
+    /// Its printed gain over that by hand.
+    fn printed_by_hand(&self) -> Option<f64> {
+        Some(self.only_name()?.gain? / self.by_hand?)
     }
 }
 
