@@ -1,5 +1,7 @@
 //! Maximum-likelihood fits by Levenberg-Marquardt, with the nuisance estimated along.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use sysid::levenberg_marquardt::{Problem, Quadratic, Search, Taken, minimise};
 
@@ -41,7 +43,8 @@ pub struct Fit {
 /// Derivatives of the residuals by coordinates of a point.
 #[derive(Debug, Clone)]
 pub struct Jacobian {
-    columns: Vec<Vec<f64>>,
+    /// Megabytes each, which copies share until one of them learns.
+    columns: Vec<Arc<Vec<f64>>>,
     gram: DMatrix<f64>,
 }
 
@@ -95,17 +98,13 @@ fn squares(values: &[f64]) -> f64 {
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Four sums at once keep the adders busy.
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let tail: f64 = a4
-        .remainder()
-        .iter()
-        .zip(b4.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a4.zip(b4) {
-        for i in 0..4 {
+    // Eight sums at once keep the adders busy.
+    let (a, a_tail) = a.as_chunks::<8>();
+    let (b, b_tail) = b.as_chunks::<8>();
+    let tail: f64 = a_tail.iter().zip(b_tail).map(|(x, y)| x * y).sum();
+    let mut sums = [0.0; 8];
+    for (x, y) in a.iter().zip(b) {
+        for i in 0..8 {
             sums[i] += x[i] * y[i];
         }
     }
@@ -192,7 +191,7 @@ impl Jacobian {
         let count = columns.len();
         let samples = columns.first().map_or(0, Vec::len);
         let mut gram = DMatrix::zeros(count, count);
-        // Pieces that stay near the processor.
+        // Pieces stay near the processor.
         for begin in (0..samples).step_by(PIECE) {
             let piece = begin..(begin + PIECE).min(samples);
             for i in 0..count {
@@ -206,14 +205,15 @@ impl Jacobian {
                 gram[(j, i)] = gram[(i, j)];
             }
         }
+        let columns = columns.into_iter().map(Arc::new).collect();
         Self { columns, gram }
     }
 
     /// These with further `columns`.
-    fn with(&self, columns: &[Vec<f64>]) -> Self {
+    fn with(&self, columns: Vec<Vec<f64>>) -> Self {
         let (known, count) = (self.columns.len(), self.columns.len() + columns.len());
         let mut all = self.columns.clone();
-        all.extend_from_slice(columns);
+        all.extend(columns.into_iter().map(Arc::new));
         let mut gram = DMatrix::zeros(count, count);
         gram.view_mut((0, 0), (known, known)).copy_from(&self.gram);
         for i in known..count {
@@ -236,12 +236,12 @@ impl Jacobian {
         let count = fit.point.nuisance.len() + fit.point.effect_coordinates();
         let predictor = model.predictor(&fit.point)?;
         let further = self.columns.len()..count;
-        Some(self.with(&columns(model, &predictor, fit, records, further)?))
+        Some(self.with(columns(model, &predictor, fit, records, further)?))
     }
 
     /// Those on the first `count` residuals.
     pub(crate) fn begin(&self, count: usize) -> Self {
-        let begin = |column: &Vec<f64>| column[..count.min(column.len())].to_vec();
+        let begin = |column: &Arc<Vec<f64>>| column[..count.min(column.len())].to_vec();
         Self::of(self.columns.iter().map(begin).collect())
     }
 
@@ -255,20 +255,28 @@ impl Jacobian {
             return;
         }
         let along = weighed / size;
-        let mut missed = change.to_vec();
-        for (column, &s) in self.columns.iter().zip(step.iter()) {
-            if s != 0.0 {
-                for (m, c) in missed.iter_mut().zip(column) {
-                    *m -= s * c;
+        let mut columns: Vec<&mut Vec<f64>> = self.columns.iter_mut().map(Arc::make_mut).collect();
+        let (mut cross, mut own) = (DVector::zeros(n), 0.0);
+        let mut missed = Vec::with_capacity(PIECE);
+        for (k, change) in change.chunks(PIECE).enumerate() {
+            let piece = k * PIECE..k * PIECE + change.len();
+            missed.clear();
+            missed.extend_from_slice(change);
+            for (column, &s) in columns.iter().zip(step.iter()) {
+                if s != 0.0 {
+                    for (m, c) in missed.iter_mut().zip(&column[piece.clone()]) {
+                        *m -= s * c;
+                    }
                 }
             }
-        }
-        let cross = DVector::from_fn(n, |i, _| dot(&self.columns[i], &missed));
-        let own = dot(&missed, &missed);
-        for (column, &share) in self.columns.iter_mut().zip(along.iter()) {
-            if share != 0.0 {
-                for (c, m) in column.iter_mut().zip(&missed) {
-                    *c += share * m;
+            own += dot(&missed, &missed);
+            for (i, column) in columns.iter_mut().enumerate() {
+                let column = &mut column[piece.clone()];
+                cross[i] += dot(column, &missed);
+                if along[i] != 0.0 {
+                    for (c, m) in column.iter_mut().zip(&missed) {
+                        *c += along[i] * m;
+                    }
                 }
             }
         }
@@ -314,7 +322,7 @@ impl Jacobian {
     /// of the scatter of the gradient between runs. A noise has bursts, and a law is never quite the rig's.
     pub fn deviations<M: ExtensibleModel>(&self, model: &M, fit: &Fit) -> Option<Vec<f64>> {
         let covariance = self.covariance(model, fit)?;
-        let columns: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();
+        let columns: Vec<&[f64]> = self.columns.iter().map(|own| own.as_slice()).collect();
         let scattered = scattered(&covariance, &columns, &fit.residuals);
         let variance =
             |i: usize| CALIBRATED * CALIBRATED * covariance[(i, i)].max(scattered[(i, i)]).max(0.0);
@@ -328,7 +336,7 @@ impl Jacobian {
 
 /// See [`Jacobian::scorer`].
 pub(crate) struct Scorer<'a> {
-    columns: &'a [Vec<f64>],
+    columns: &'a [Arc<Vec<f64>>],
     residuals: &'a [f64],
     factor: Cholesky<f64, Dyn>,
     pull: DVector<f64>,
@@ -448,7 +456,7 @@ impl<M: ExtensibleModel> Problem for Held<'_, M> {
                 let count = place.point.nuisance.len() + place.point.effect_coordinates();
                 let rest = own.columns.len()..count;
                 let fresh = columns(self.model, self.predictor, place, self.records, rest);
-                own.with(&fresh.ok_or(())?)
+                own.with(fresh.ok_or(())?)
                     .normal_equations(self.model, place)
             }
         };

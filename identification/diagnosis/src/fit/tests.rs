@@ -303,7 +303,7 @@ fn central_derivatives_are_those_of_the_closed_form() {
     for (i, j) in [(0, 0), (1, 3), (3, 1)] {
         let sum: f64 = central.columns[i]
             .iter()
-            .zip(&central.columns[j])
+            .zip(central.columns[j].iter())
             .map(|(a, b)| a * b)
             .sum();
         assert!((central.gram[(i, j)] - sum).abs() < 1e-9);
@@ -327,32 +327,44 @@ fn derivatives_are_added_and_cut_with_their_products() {
     assert!((cut.gram[(2, 3)] - products).abs() < 1e-12);
 }
 
+/// Change of the residuals along `step`.
+fn along(jacobian: &Jacobian, step: &[f64]) -> Vec<f64> {
+    let columns = || step.iter().zip(&jacobian.columns);
+    (0..jacobian.columns[0].len())
+        .map(|k| columns().map(|(s, column)| s * column[k]).sum())
+        .collect()
+}
+
+/// As `jacobian`, its products computed from its columns.
+fn computed(jacobian: &Jacobian) -> Jacobian {
+    Jacobian::of(jacobian.columns.iter().map(|own| own.to_vec()).collect())
+}
+
+#[test]
+fn long_columns_learn_in_pieces() {
+    let wave = |f: f64| (0..2 * PIECE + 5).map(|k| (f * k as f64).sin()).collect();
+    let mut jacobian = Jacobian::of(vec![wave(0.1), wave(0.37), wave(0.02)]);
+    let (step, change): (_, Vec<f64>) = (dvector![0.4, 0.0, -1.3], wave(0.2));
+    jacobian.learn(&step, &change);
+    close(&along(&jacobian, step.as_slice()), &change, 1e-12);
+    let again = computed(&jacobian);
+    assert!((&jacobian.gram - &again.gram).amax() < 1e-9);
+}
+
 #[test]
 fn derivatives_learn_along_a_step_and_not_across_it() {
     let columns = vec![vec![1.0, 0.0, 2.0], vec![0.5, 1.0, 0.0]];
     let mut jacobian = Jacobian::of(columns.clone());
+    let before = jacobian.clone();
     let step = dvector![0.3, -0.8];
     let change = [1.0, 2.0, -1.0];
     jacobian.learn(&step, &change);
-    let along = |columns: &[Vec<f64>], step: &[f64]| -> Vec<f64> {
-        (0..3)
-            .map(|k| {
-                step.iter()
-                    .zip(columns)
-                    .map(|(s, column)| s * column[k])
-                    .sum()
-            })
-            .collect()
-    };
-    close(&along(&jacobian.columns, step.as_slice()), &change, 1e-12);
+    close(&along(&jacobian, step.as_slice()), &change, 1e-12);
     // Across it in the sense of what the residuals tell: weights 5 and 1.25.
     let across = [1.25 * 0.8, 5.0 * 0.3];
-    close(
-        &along(&jacobian.columns, &across),
-        &along(&columns, &across),
-        1e-12,
-    );
-    let again = Jacobian::of(jacobian.columns.clone());
+    close(&along(&jacobian, &across), &along(&before, &across), 1e-12);
+    assert_eq!(before.columns, Jacobian::of(columns).columns);
+    let again = computed(&jacobian);
     assert!((&jacobian.gram - &again.gram).amax() < 1e-12);
     // No step teaches anything, nor does one whose change is rounding.
     jacobian.learn(&dvector![0.0, 0.0], &change);

@@ -555,6 +555,29 @@ mod tests {
         );
     }
 
+    /// What is slower than a record is a voltage's as well as a sensor's, and this one would be broken.
+    #[test]
+    fn a_drift_is_never_learned_as_a_broken_sensor() {
+        let rig = IdentifiedRig {
+            specimen: Some(LinearSpecimen::default()),
+            ..Default::default()
+        };
+        let mut there = stated();
+        there.coloured[0] = vec![Disturbance::below(40.0 * STATED[0], 0.05, PERIOD)];
+        let model = model(&rig, &there, 53);
+        let origin = Point {
+            nuisance: vec![0.0; model.nuisance()],
+            effects: Vec::new(),
+        };
+        let fit = evaluate(&model, &origin, &[0, 1]).unwrap();
+        let lesson = model.with_learned_noise(&origin, &fit.residuals, &[0, 1]);
+        let noise = lesson.unwrap().model.noise;
+        assert!(!noise.coloured[0].is_empty());
+        for part in &noise.coloured[0] {
+            assert!(part.sigma <= 10.001 * STATED[0], "{noise:?}");
+        }
+    }
+
     #[test]
     fn an_effect_below_what_matters_is_present_but_too_small() {
         let mut rig = IdentifiedRig {

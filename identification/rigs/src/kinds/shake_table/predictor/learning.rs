@@ -37,8 +37,9 @@ const GRID: f64 = 1.08;
 /// Damping ratios of the resonances that are tried, and those that a fit may reach.
 const DAMPINGS: [f64; 3] = [0.02, 0.1, 0.4];
 const DAMPING: (f64, f64) = (2e-3, 0.7);
-/// A size has no bound of its own: its prior holds it.
-const ANY_SIZE: (f64, f64) = (f64::MIN_POSITIVE, f64::MAX);
+/// A part of a sensor's noise in what is stated, at most. A slow voltage moves the table as a drift of its sensor
+/// would seem to, and other channels hardly tell which it is.
+const LOUDEST_PART: f64 = 10.0;
 
 /// What is expected of a level and its spread, on the logarithm: the laboratory states the sensors'
 /// noise, of the rest next to nothing is known.
@@ -339,6 +340,14 @@ impl Part {
         }
     }
 
+    /// Its largest size: that of coloured noise of a sensor; its prior alone holds another one.
+    fn largest(&self) -> f64 {
+        if self.source == 0 || self.shape == Shape::White {
+            return f64::INFINITY;
+        }
+        LOUDEST_PART / USUAL_PART * self.priors[0].0.exp()
+    }
+
     fn coordinates(&self) -> usize {
         match self.shape {
             Shape::Known(_) => 0,
@@ -453,7 +462,7 @@ impl Parts {
                 let value = &mut next.at[place];
                 *value -= step[place].clamp(-1.0, 1.0);
                 let (low, high) = match coordinate {
-                    0 => ANY_SIZE,
+                    0 => (0.0, part.largest()),
                     1 => (0.5 * spectra.lowest, 0.45 / spectra.period),
                     _ => DAMPING,
                 };
@@ -644,7 +653,7 @@ impl Spectra {
                     let score = 0.5 * pull * pull / information;
                     let best = &mut best[part.coordinates() - 2];
                     if score > best.as_ref().map_or(0.5 * PRICE, |(gain, _)| *gain) {
-                        at[0] = 0.5 * (pull / information).ln();
+                        at[0] = (pull / information).sqrt().min(part.largest()).ln();
                         let mut next = parts.clone();
                         next.add(part, &at);
                         *best = Some((score, next));
