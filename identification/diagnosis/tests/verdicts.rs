@@ -237,6 +237,27 @@ fn an_effect_is_named_with_its_size_and_predicts_what_was_not_fitted() {
     }
 }
 
+/// A tone that no effect makes is left beside one that explains nearly all, and by itself.
+#[test]
+fn traces_count_for_less_beside_an_effect_that_explains_nearly_all() {
+    let left = |size, tone| {
+        let found = judged(1.0, [size, 0.0, 0.0, tone]);
+        let names: Vec<_> = found.effects.iter().map(|own| own.effect).collect();
+        (found.verdict, names, found.tests[0].deviate)
+    };
+    let (verdict, names, deviate) = left(0.4, 0.03);
+    assert_eq!((verdict, names), (Verdict::Named, vec!["cubic"]));
+    let (verdict, _, alone) = left(0.0, 0.03);
+    assert_eq!(verdict, Verdict::Unexplained);
+    assert!(
+        deviate > 5.6 && (alone - deviate).abs() < 0.01,
+        "{deviate} {alone}"
+    );
+    let (verdict, _, deviate) = left(0.4, 0.036);
+    assert!(deviate < 9.5, "{deviate}");
+    assert_eq!(verdict, Verdict::Unexplained);
+}
+
 #[test]
 fn a_model_s_score_is_its_cost_with_the_prices_of_its_effects_and_noises() {
     let mut spring = Spring::new(1.0, [0.4, 0.0, 0.0, 0.0]);

@@ -5,6 +5,7 @@ use super::diagnosis::Finding;
 use super::gain::Gain;
 use crate::kinds::INTERVAL_95;
 use diagnosis::Test;
+use diagnosis::adequacy::LARGEST_DEVIATE;
 use diagnosis::{NamedEffect, ParameterEstimate, Verdict, WeighedModel};
 use plant::identified::effects::{find, quantity::laboratory_unit};
 use units::convert;
@@ -155,7 +156,13 @@ pub(super) fn sentence(
              record is {:.2} times the noise floor.",
             gain.after_ratio
         ),
-        Verdict::Named => format!("{causes}; with {it} {falls}."),
+        Verdict::Named => {
+            let left = tests.iter().find(|test| test.deviate > LARGEST_DEVIATE);
+            let left = left.map_or_else(String::new, |test| {
+                format!("; a little is left, most in \"{}\"", test.what)
+            });
+            format!("{causes}; with {it} {falls}{left}.")
+        }
         Verdict::Ambiguous => {
             let sets: Vec<String> = alternatives
                 .iter()
@@ -335,6 +342,37 @@ mod tests {
             told(1.0, 1.0, [-1e-6, 2e-6]),
             "the error on the validation record changes by less than 0.1 % (95 %) and is 1.00 times the noise floor"
         );
+    }
+
+    #[test]
+    fn what_a_named_effect_leaves_is_said() {
+        let lag = NamedEffect {
+            effect: "displacement_lag",
+            parameters: vec![estimate(10.0, 0.1, "Hz")],
+            confidence: 0.95,
+        };
+        let gain = Gain {
+            channels: Vec::new(),
+            before_nrmse: 0.3,
+            after_nrmse: 0.1,
+            noise_floor_nrmse: 0.1,
+            before_ratio: 3.0,
+            after_ratio: 1.04,
+            interval_95: [0.6, 0.7],
+        };
+        let said = |deviate| {
+            let test = Test {
+                what: "validation: displacement, mean".into(),
+                deviate,
+                place: None,
+                is_stated: false,
+            };
+            let effects = std::slice::from_ref(&lag);
+            sentence(Verdict::Named, effects, &[], &gain, &[test], &[])
+        };
+        assert!(said(5.5).ends_with("to 1.04 times the noise floor."));
+        let left = "; a little is left, most in \"validation: displacement, mean\".";
+        assert!(said(5.7).ends_with(left), "{}", said(5.7));
     }
 
     #[test]
