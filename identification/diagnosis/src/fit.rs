@@ -553,7 +553,8 @@ pub(crate) fn polish<M: ExtensibleModel>(
         let expected = before - found.cost;
         let excess = (squares(&best.residuals) - best.residuals.len() as f64).max(0.0);
         let enough = 0.1 + share * excess;
-        let next = evaluated(model, &found.point, records);
+        let next = evaluated(model, &found.point, records)
+            .map(|next| continued(model, &best, next, records));
         // Near the optimum the gain's own dependence on the point can outweigh the step: what was
         // gained with the gain held counts.
         let better =
@@ -575,6 +576,29 @@ pub(crate) fn polish<M: ExtensibleModel>(
         }
     }
     Some((best, jacobian))
+}
+
+/// `next` moved on in the direction from `from`, twice as far each time, as long as the cost falls. A round with the gain
+/// held goes a short way where the gain follows from what it changes, and the next one goes the same way.
+fn continued<M: ExtensibleModel>(
+    model: &M,
+    from: &Fit,
+    mut next: (Fit, M::Predictor),
+    records: &[usize],
+) -> (Fit, M::Predictor) {
+    if next.0.cost >= from.cost {
+        return next;
+    }
+    let mut step = from.point.step_to(&next.0.point);
+    loop {
+        let point = next.0.point.moved(step.as_slice(), model.candidates());
+        let farther = evaluated(model, &point, records).filter(|own| own.0.cost < next.0.cost);
+        let Some(farther) = farther else {
+            return next;
+        };
+        next = farther;
+        step *= 2.0;
+    }
 }
 
 #[cfg(test)]

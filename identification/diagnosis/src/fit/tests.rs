@@ -8,6 +8,8 @@ const SAMPLES: usize = 203;
 struct Waves {
     candidates: Vec<Candidate>,
     measured: Vec<Vec<f64>>,
+    /// Share of its way that the sine's amplitude goes while the gain is held.
+    share: f64,
 }
 
 fn parameter(name: &'static str, role: Role, bounds: (f64, f64)) -> EffectParameter {
@@ -50,6 +52,7 @@ impl Waves {
         Self {
             candidates,
             measured,
+            share: 1.0,
         }
     }
 
@@ -63,7 +66,8 @@ impl Waves {
 }
 
 impl ExtensibleModel for Waves {
-    type Predictor = ();
+    /// The sine's amplitude that it was designed for.
+    type Predictor = f64;
 
     fn nuisance(&self) -> usize {
         2
@@ -105,18 +109,20 @@ impl ExtensibleModel for Waves {
         SAMPLES
     }
 
-    fn predictor(&self, _: &Point) -> Option<()> {
-        Some(())
+    fn predictor(&self, point: &Point) -> Option<f64> {
+        Some(point.nuisance[0])
     }
 
-    fn log_determinant(&self, (): &()) -> f64 {
+    fn log_determinant(&self, _: &f64) -> f64 {
         0.5
     }
 
-    fn residuals(&self, (): &(), point: &Point, record: usize, out: &mut [f64]) -> bool {
+    fn residuals(&self, designed: &f64, point: &Point, record: usize, out: &mut [f64]) -> bool {
         let decay = point.effects.first().map_or(&[][..], |(_, q)| q);
+        let sine = designed + (point.nuisance[0] - designed) / self.share;
+        let amplitudes = [sine, point.nuisance[1]];
         for (k, out) in out.iter_mut().enumerate() {
-            *out = self.measured[record][k] - Self::simulated(&point.nuisance, decay, k);
+            *out = self.measured[record][k] - Self::simulated(&amplitudes, decay, k);
         }
         true
     }
@@ -370,6 +376,16 @@ fn derivatives_learn_along_a_step_and_not_across_it() {
     jacobian.learn(&dvector![0.0, 0.0], &change);
     jacobian.learn(&dvector![1e-15, 1e-15], &[1e-16, -1e-16, 0.0]);
     assert_eq!(jacobian.columns, again.columns);
+}
+
+#[test]
+fn a_fit_goes_on_where_the_gain_follows() {
+    let mut model = Waves::of([20.0, 1.0], [0.0, 1.0], 1);
+    let start = evaluate(&model, &bare(), &[0]).unwrap();
+    let (at_once, _) = polish(&model, &start, &[0], None, 8, 0.0).unwrap();
+    model.share = 0.05;
+    let (best, _) = polish(&model, &start, &[0], None, 8, 0.0).unwrap();
+    close(&best.point.nuisance, &at_once.point.nuisance, 0.05);
 }
 
 #[test]
