@@ -167,6 +167,34 @@ fn a_clipped_sensor_is_named() {
     assert!(message.contains("`acceleration` is clipped"), "{message}");
 }
 
+/// Where no law is stated, neither is where the drive's output ends.
+#[test]
+fn a_command_at_its_rail_is_a_note_and_no_refusal() {
+    let mut case = healthy();
+    case.nominal.controller = None;
+    edit(&mut case.validation, Channel::ValveCommand, |values| {
+        let rail = 0.8 * values.iter().fold(0.0f64, |most, u| most.max(u.abs()));
+        values.iter_mut().for_each(|u| *u = u.clamp(-rail, rail));
+    });
+    let found = diagnose(&case, Observer::none()).unwrap();
+    let told = |note: &&String| note.starts_with("validation: the valve command is at");
+    assert_eq!(
+        found.notes.iter().filter(told).count(),
+        1,
+        "{:?}",
+        found.notes
+    );
+    edit(&mut case.validation, Channel::ValveCommand, |values| {
+        let rail = 0.05 * values.iter().fold(0.0f64, |most, u| most.max(u.abs()));
+        values.iter_mut().for_each(|u| *u = u.clamp(-rail, rail));
+    });
+    let message = refused(&case);
+    assert!(
+        message.contains("the valve command is at its limit in"),
+        "{message}"
+    );
+}
+
 #[test]
 fn a_sensor_that_stands_at_its_end_is_clipped_and_not_frozen() {
     let mut case = healthy();

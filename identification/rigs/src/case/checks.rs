@@ -64,10 +64,10 @@ pub fn problems(recording: &Recording, nominal: &Nominal) -> Vec<String> {
         return found;
     }
     found.extend(timing(recording, nominal));
-    let limit = nominal.controller.map_or(f64::INFINITY, |law| law.limit);
+    let rail = rail(recording, nominal);
     for channel in Channel::OUTPUTS.into_iter().chain([Channel::ValveCommand]) {
         let limit = match channel {
-            Channel::ValveCommand => limit,
+            Channel::ValveCommand => rail,
             _ => f64::INFINITY,
         };
         let values = recording.samples(channel);
@@ -76,20 +76,39 @@ pub fn problems(recording: &Recording, nominal: &Nominal) -> Vec<String> {
     if found.is_empty() {
         found.extend(held(recording));
     }
-    if let Some(limit) = nominal.controller.map(|law| law.limit) {
-        let at_limit = recording
-            .samples(Channel::ValveCommand)
-            .iter()
-            .filter(|u| u.abs() > 0.999 * limit)
-            .count();
-        if at_limit > n / 4 {
-            found.push(format!(
-                "{name}: the valve command is at its limit in {at_limit} of {n} samples, so the \
-                 rig was not under control"
-            ));
-        }
+    let at_rail = at_rail(recording, rail);
+    if at_rail > n / 4 {
+        found.push(format!(
+            "{name}: the valve command is at its limit in {at_rail} of {n} samples, so the \
+             rig was not under control"
+        ));
     }
     found
+}
+
+/// Where the drive's output ends, V: as stated, or the largest command recorded.
+fn rail(recording: &Recording, nominal: &Nominal) -> f64 {
+    let commands = recording.samples(Channel::ValveCommand).iter();
+    let largest = || commands.fold(0.0, |most: f64, u| most.max(u.abs()));
+    nominal.controller.map_or_else(largest, |law| law.limit)
+}
+
+fn at_rail(recording: &Recording, rail: f64) -> usize {
+    let commands = recording.samples(Channel::ValveCommand).iter();
+    commands.filter(|u| u.abs() > 0.999 * rail).count()
+}
+
+/// That the command dwells at a rail that nobody stated, if it does.
+pub fn unstated_rail(recording: &Recording, nominal: &Nominal) -> Option<String> {
+    let rail = rail(recording, nominal);
+    let count = at_rail(recording, rail);
+    (nominal.controller.is_none() && count > 2 * CLIPPED_RUN).then(|| {
+        format!(
+            "{}: the valve command is at {rail:.4} V in {count} samples, which is taken for the end of the \
+             drive's output; if it is that of the recorder's range, record with a larger one",
+            recording.name
+        )
+    })
 }
 
 /// That `recording` moves too little to tell anything, if it does. A low level is no fault of one
@@ -230,7 +249,7 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
     if clipped > 2 * (CLIPPED_RUN + beside) && high > low {
         found.push(format!(
             "{name}: `{channel}` is clipped, {clipped} readings are at its extremes {low:.4e} and \
-             {high:.4e}"
+             {high:.4e} (SI): record a smaller motion, or with a larger range of the channel"
         ));
     }
     found

@@ -6,7 +6,7 @@ mod nominal;
 mod nominal_error;
 mod template;
 
-pub use checks::{blind_spot, noise_ratios, problems, too_little_excitation};
+pub use checks::{blind_spot, noise_ratios, problems, too_little_excitation, unstated_rail};
 pub use model::rig_of;
 pub use nominal::{ControlLaw, Nominal};
 pub use nominal_error::NominalError;

@@ -18,7 +18,8 @@ use super::mains::{Line, line, readable};
 use super::relations::{misfit, relations};
 use super::sentence::{MOST, of_courses, of_findings, said, sentence};
 use crate::case::{
-    Case, CaseError, ControlLaw, Nominal, blind_spot, noise_ratios, problems, too_little_excitation,
+    Case, CaseError, ControlLaw, Nominal, blind_spot, noise_ratios, problems,
+    too_little_excitation, unstated_rail,
 };
 use crate::kinds::INTERVAL_95;
 use crate::kinds::shake_table::catalogue::{Prepared, ShakeTableModel, TOO_LOUD, loudest};
@@ -202,6 +203,7 @@ fn prepare(case: &Case, notes: &mut Vec<String>) -> Result<ShakeTableModel, Case
         }
         let own = recording.notes.iter();
         notes.extend(own.map(|note| format!("{}: {note}", recording.name)));
+        notes.extend(unstated_rail(recording, nominal));
     }
     if !found.is_empty() {
         return Err(CaseError::Unfit { problems: found });
