@@ -87,7 +87,7 @@ pub(super) fn settled_from<M: ExtensibleModel + Clone>(
     observer: Observer<'_>,
 ) -> Option<Settled<M>> {
     let first = settled(near, start, records, observer);
-    if first.as_ref().is_some_and(|own| own.model.is_usual()) {
+    if near.has_noises_of(assumed) || first.as_ref().is_some_and(|own| own.model.is_usual()) {
         return first;
     }
     let second = settled(assumed, start, records, observer);
@@ -105,13 +105,13 @@ pub(super) fn without(point: &Point, place: usize) -> Point {
 }
 
 /// `found` without the effects, or what they have beyond their special cases, that do not earn their price
-/// once the noises may take their place.
+/// once the noises may take their place; and the models without each of those that stay.
 pub(super) fn ablated<M: ExtensibleModel + Clone>(
     assumed: &M,
     found: Settled<M>,
     records: &[usize],
     observer: Observer<'_>,
-) -> Settled<M> {
+) -> (Settled<M>, Vec<Option<Settled<M>>>) {
     let mut current = found;
     loop {
         let candidates = current.model.candidates();
@@ -128,7 +128,7 @@ pub(super) fn ablated<M: ExtensibleModel + Clone>(
             .clone()
             .filter_map(|place| refitted(special_case(candidates, point, place)?))
             .collect::<Vec<_>>();
-        let simpler: Vec<_> = places
+        let mut simpler: Vec<_> = places
             .map(|place| refitted(without(point, place)))
             .collect();
         let gain = |own: &Settled<M>| own.hypothesis.score - current.hypothesis.score;
@@ -139,16 +139,23 @@ pub(super) fn ablated<M: ExtensibleModel + Clone>(
             .map(|((i, _), own)| (candidates[*i].law, own.as_ref().map_or(0.0, gain)))
             .collect();
         let is_worth = |own: &Settled<M>| pays(candidates, &current.hypothesis, &own.hypothesis);
-        let simpler = simpler
+        let score = |own: &Settled<M>| own.hypothesis.score;
+        let of_place = |place: &usize| simpler[*place].as_ref().map_or(f64::INFINITY, score);
+        let goes = |place: &usize| {
+            let own = simpler[*place].as_ref();
+            own.is_some_and(|own| !is_worth(own) || is_form(&gains, *place))
+        };
+        let place = (0..simpler.len())
+            .filter(goes)
+            .min_by(|a, b| of_place(a).total_cmp(&of_place(b)));
+        let smaller = place.and_then(|place| simpler[place].take());
+        let smaller = smaller
             .into_iter()
-            .enumerate()
-            .filter_map(|(place, own)| own.filter(|own| !is_worth(own) || is_form(&gains, place)));
-        let smaller = simpler
             .chain(special.into_iter().filter(|own| !is_worth(own)))
-            .min_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score));
+            .min_by(|a, b| score(a).total_cmp(&score(b)));
         match smaller {
             Some(smaller) => current = smaller,
-            None => return current,
+            None => return (current, simpler),
         }
     }
 }

@@ -56,6 +56,11 @@ pub trait ExtensibleModel: Sync {
         true
     }
 
+    /// Whether its noises are those of `other`.
+    fn has_noises_of(&self, _other: &Self) -> bool {
+        false
+    }
+
     /// What the noises cost that were learned beyond those assumed, in units of `2 log` likelihood: a
     /// coloured noise competes with every effect that resembles it.
     fn noise_price(&self) -> f64 {

@@ -34,23 +34,11 @@ fn forces([x, v]: [f64; 2], k: usize) -> [f64; 4] {
     [x * x * x, v, v.signum(), (0.43 * k as f64).sin()]
 }
 
-/// The force at a point of the model.
-fn force(point: &Point, record: usize, k: usize) -> f64 {
-    let own = motion(record, k);
-    let forces = forces(own, k);
-    let effects = point.effects.iter();
-    let of_effect = |(i, q): &(usize, Vec<f64>)| match q[..] {
-        [size, range] => 0.1 * size * (own[1] / range).tanh(),
-        // What is behind the others is another name of dry friction.
-        _ => 0.1 * q[0] * forces[if *i == 4 { 2 } else { *i }],
-    };
-    let extra: f64 = effects.map(of_effect).sum();
-    (1.0 + KNOWN_TO * point.nuisance[0]) * own[0] + extra
-}
-
 #[derive(Clone)]
 struct Spring {
     candidates: Vec<Candidate>,
+    /// Shares of the forces in a unit of each candidate.
+    shares: Vec<[f64; 4]>,
     measured: Vec<Vec<f64>>,
     noise_price: f64,
 }
@@ -109,9 +97,33 @@ impl Spring {
         candidates.push(smooth);
         Self {
             candidates,
+            shares: (0..4)
+                .map(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))))
+                .collect(),
             measured: (0..3).map(&mut record).collect(),
             noise_price: 0.0,
         }
+    }
+
+    /// Adds a candidate like dry friction that has these shares of the forces.
+    fn add(&mut self, effect: &'static str, shares: [f64; 4]) {
+        let like = self.candidates[2].clone();
+        self.candidates.push(Candidate { effect, ..like });
+        self.shares.push(shares);
+    }
+
+    /// The force at a point of the model.
+    fn force(&self, point: &Point, record: usize, k: usize) -> f64 {
+        let own = motion(record, k);
+        let of_effect = |(i, q): &(usize, Vec<f64>)| match q[..] {
+            [size, range] => 0.1 * size * (own[1] / range).tanh(),
+            _ => {
+                let pairs = forces(own, k).into_iter().zip(self.shares[*i]);
+                0.1 * q[0] * pairs.map(|(force, share)| force * share).sum::<f64>()
+            }
+        };
+        let extra: f64 = point.effects.iter().map(of_effect).sum();
+        (1.0 + KNOWN_TO * point.nuisance[0]) * own[0] + extra
     }
 }
 
@@ -165,7 +177,7 @@ impl ExtensibleModel for Spring {
     }
     fn residuals(&self, _: &(), point: &Point, record: usize, out: &mut [f64]) -> bool {
         for (k, (out, measured)) in out.iter_mut().zip(&self.measured[record]).enumerate() {
-            *out = (measured - force(point, record, k)) / NOISE;
+            *out = (measured - self.force(point, record, k)) / NOISE;
         }
         out.iter().all(|value| value.is_finite())
     }
@@ -323,9 +335,7 @@ fn the_general_case_of_an_effect_is_asked_for_where_the_special_one_leaves_trace
 #[test]
 fn two_effects_that_no_record_tells_apart_are_ambiguous() {
     let mut spring = Spring::new(1.0, [0.0, 0.0, 0.5, 0.0]);
-    let mut twin = spring.candidates[2].clone();
-    twin.effect = "twin";
-    spring.candidates.push(twin);
+    spring.add("twin", [0.0, 0.0, 1.0, 0.0]);
     let found = judge(&mut spring, &[0, 1], &[2], Observer::none()).unwrap();
     assert_eq!(found.verdict, Verdict::Ambiguous);
     let own = found.effects[0].effect;
@@ -343,6 +353,18 @@ fn two_effects_that_no_record_tells_apart_are_ambiguous() {
         "{weights:?}"
     );
     assert!(found.candidates.iter().all(|own| own.explains > 0.99));
+}
+
+/// A tone with some dry friction in it explains more than the tone alone, until viscous friction is there.
+#[test]
+fn an_effect_that_was_right_only_by_itself_gives_its_place_to_another_one() {
+    let mut spring = Spring::new(1.0, [0.5, 0.1, 0.0, 0.4]);
+    spring.add("tone", [0.0, 0.0, 0.0, 1.0]);
+    spring.add("mixture", [0.0, 0.0, 0.6, 1.0]);
+    let found = judge(&mut spring, &[0, 1], &[2], Observer::none()).unwrap();
+    assert_eq!(found.verdict, Verdict::Named);
+    let names: Vec<_> = sizes(&found).into_iter().map(|own| own.0).collect();
+    assert_eq!(names, ["cubic", "tone", "viscous"]);
 }
 
 #[test]
@@ -402,7 +424,7 @@ impl SimulatedModel for Spring {
             1 => half..SAMPLES,
             _ => 0..SAMPLES,
         };
-        part.map(|k| self.measured[0][k] - force(point, 0, k))
+        part.map(|k| self.measured[0][k] - self.force(point, 0, k))
             .collect()
     }
     fn folds(&self, _: usize) -> [usize; 2] {

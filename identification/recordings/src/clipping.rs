@@ -1,6 +1,8 @@
 //! Dwells at a channel's extreme: a clipped sensor's, or those of a converter with coarse steps where the
 //! motion turns.
 
+use super::faults::runs;
+
 /// Samples to either side of a dwell that tell where the signal was going.
 const FLANK: (usize, usize) = (3, 12);
 /// Steps of the converter by which a signal must have been going beyond its extreme: rounding and the noise
@@ -11,6 +13,37 @@ const BEYOND: f64 = 2.0;
 /// turned. A parabola that stays within a step for four samples falls by two and a quarter to the
 /// next one.
 const NEXT: f64 = 3.0;
+
+/// Equal readings in a row that are no chance.
+pub const RUN: usize = 4;
+
+/// Where a signal was cut off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clipped {
+    /// Samples at either extreme, in dwells from which the signal went on beyond.
+    pub samples: usize,
+    /// The least and the largest reading.
+    pub extremes: [f64; 2],
+}
+
+impl Clipped {
+    /// Of the readings `values` of a signal that itself ends at `limit` to either side.
+    pub fn of(values: &[f64], limit: f64) -> Self {
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let extremes = [least, largest];
+        let step = step(values);
+        let dwells = extremes.map(|extreme| runs(values, |value| value == extreme));
+        let cut = dwells.iter().flatten().filter(|(start, end)| {
+            let is_long = end - start >= RUN && least < largest;
+            is_long && values[*start].abs() < limit && cuts_a_peak(values, *start, *end, step)
+        });
+        Self {
+            samples: cut.map(|(start, end)| end - start).sum(),
+            extremes,
+        }
+    }
+}
 
 /// Usual distance between neighbouring levels of `values`: a converter's step where it is coarse.
 pub fn step(values: &[f64]) -> f64 {
@@ -26,7 +59,7 @@ pub fn step(values: &[f64]) -> f64 {
 /// samples to either side passes that level by more than two of the converter's steps, or the next
 /// reading is farther away than after a turn. A dwell at the end of a record, of which nothing is
 /// known on one side, counts as one.
-pub fn cuts_a_peak(values: &[f64], start: usize, end: usize, step: f64) -> bool {
+fn cuts_a_peak(values: &[f64], start: usize, end: usize, step: f64) -> bool {
     let flank = ((end - start) / 2).clamp(FLANK.0, FLANK.1);
     let flank = flank.min(start).min(values.len().saturating_sub(end));
     if flank < 2 || end <= start {
@@ -97,6 +130,22 @@ mod tests {
         // In the lowest readings as in the highest.
         let lowest: Vec<f64> = values.iter().map(|value| -value).collect();
         assert!(cuts_a_peak(&lowest, 3, 7, 1.0) && !cuts_a_peak(&lowest, 3, 7, 2.0));
+    }
+
+    #[test]
+    fn what_is_cut_off_is_counted_but_at_the_end_of_the_signal_itself() {
+        let wave = |k: usize| (0.05 * k as f64).sin().clamp(-0.5, 0.8);
+        let values: Vec<f64> = (0..1000).map(wave).collect();
+        let at = |level: f64| values.iter().filter(|value| **value == level).count();
+        let clipped = Clipped::of(&values, f64::INFINITY);
+        assert_eq!(clipped.extremes, [-0.5, 0.8]);
+        assert_eq!(clipped.samples, at(-0.5) + at(0.8));
+        assert_eq!(Clipped::of(&values, 0.8).samples, at(-0.5));
+        assert_eq!(Clipped::of(&values, 0.5).samples, 0);
+        // Neither a wave with all of its peaks nor a constant.
+        let whole: Vec<f64> = (0..1000).map(|k| (0.05 * k as f64).sin()).collect();
+        assert_eq!(Clipped::of(&whole, f64::INFINITY).samples, 0);
+        assert_eq!(Clipped::of(&[1.0; 50], f64::INFINITY).samples, 0);
     }
 
     #[test]

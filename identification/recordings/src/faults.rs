@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::clipping::{cuts_a_peak, step};
+use super::clipping::Clipped;
 use super::{Recording, is_constant};
 
 /// Something about a recording that its reader should know.
@@ -20,8 +20,6 @@ impl fmt::Display for Finding {
     }
 }
 
-/// A stretch at the same extreme value this long is a clipped channel.
-const CLIPPED_RUN: usize = 4;
 /// A stretch of one repeated value this long, in a channel that otherwise moves, is a drop-out.
 const STUCK_RUN: usize = 25;
 
@@ -41,24 +39,12 @@ impl Recording {
                 tell(format!("`{name}` is constant"));
                 continue;
             }
-            let (low, high) = values
-                .iter()
-                .fold((f64::MAX, f64::MIN), |(low, high), &value| {
-                    (low.min(value), high.max(value))
-                });
-            let step = step(values);
-            let mut clipped = 0;
-            for extreme in [low, high] {
-                clipped += runs(values, |value| value == extreme)
-                    .iter()
-                    .filter(|run| run.1 - run.0 >= CLIPPED_RUN)
-                    .filter(|run| cuts_a_peak(values, run.0, run.1, step))
-                    .map(|run| run.1 - run.0)
-                    .sum::<usize>();
-            }
-            if clipped > 0 {
+            let clipped = Clipped::of(values, f64::INFINITY);
+            let [low, high] = clipped.extremes;
+            if clipped.samples > 0 {
                 tell(format!(
-                    "`{name}` is clipped: {clipped} samples are at {low:.4e} or {high:.4e} (SI)"
+                    "`{name}` is clipped: {} samples are at {low:.4e} or {high:.4e} (SI)",
+                    clipped.samples
                 ));
             }
             let stuck: Vec<(usize, usize)> = stuck_runs(values)

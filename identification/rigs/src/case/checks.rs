@@ -1,15 +1,13 @@
 //! What makes a recording unfit for a diagnosis, said by name.
 
 use super::nominal::Nominal;
-use recordings::clipping::{cuts_a_peak, step};
+use recordings::clipping::{Clipped, RUN, step};
 use recordings::{Channel, OUTPUT_NAMES, Recording, RoundedStamps, TimeBase, mean_and_deviation};
 
 /// Shortest recording that is looked at, samples.
 const SHORTEST: usize = 500;
 /// Standard deviations of the sensor's noise that the displacement must exceed.
 const LEAST_EXCITATION: f64 = 8.0;
-/// Equal readings in a row, at the channel's extreme, that betray a clipped sensor.
-const CLIPPED_RUN: usize = 4;
 /// Samples that may repeat the one before in every channel without being looked at.
 const MOST_REPEATED: usize = 5;
 /// Samples over which a channel repeats itself about equally often.
@@ -102,7 +100,7 @@ fn at_rail(recording: &Recording, rail: f64) -> usize {
 pub fn unstated_rail(recording: &Recording, nominal: &Nominal) -> Option<String> {
     let rail = rail(recording, nominal);
     let count = at_rail(recording, rail);
-    (nominal.controller.is_none() && count > 2 * CLIPPED_RUN).then(|| {
+    (nominal.controller.is_none() && count > 2 * RUN).then(|| {
         format!(
             "{}: the valve command is at {rail:.4} V in {count} samples, which is taken for the end of the \
              drive's output; if it is that of the recorder's range, record with a larger one",
@@ -199,8 +197,8 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
         ));
         return found;
     }
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let clipped = Clipped::of(values, limit);
+    let [low, high] = clipped.extremes;
     // Where a converter's steps are coarse, readings repeat wherever the motion turns or rests, as often
     // a few steps below the extremes.
     let mut levels = values.to_vec();
@@ -214,7 +212,7 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
         .map_or(low, |place| levels[place]);
     let step = step(values);
     let (mut run, mut start) = (1, 0usize);
-    let (mut clipped, mut beside) = (0, 0);
+    let mut beside = 0;
     for k in 1..=values.len() {
         if k < values.len() && values[k] == values[k - 1] {
             run += 1;
@@ -237,19 +235,16 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
             ));
             return found;
         }
-        if run >= CLIPPED_RUN && is_extreme {
-            if cuts_a_peak(values, start, k, step) {
-                clipped += run;
-            }
-        } else if run >= CLIPPED_RUN && (value >= next_to_high || value <= next_to_low) {
+        if run >= RUN && !is_extreme && (value >= next_to_high || value <= next_to_low) {
             beside += run;
         }
         (run, start) = (1, k);
     }
-    if clipped > 2 * (CLIPPED_RUN + beside) && high > low {
+    if clipped.samples > 2 * (RUN + beside) {
         found.push(format!(
-            "{name}: `{channel}` is clipped, {clipped} readings are at its extremes {low:.4e} and \
-             {high:.4e} (SI): record a smaller motion, or with a larger range of the channel"
+            "{name}: `{channel}` is clipped, {} readings are at its extremes {low:.4e} and \
+             {high:.4e} (SI): record a smaller motion, or with a larger range of the channel",
+            clipped.samples
         ));
     }
     found

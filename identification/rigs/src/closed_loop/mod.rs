@@ -32,6 +32,7 @@ use self::specimen::SpecimenFit;
 use self::valve::Valve;
 use plant::identified::valve_curve::ValveCurve;
 use recordings::IdentificationError;
+use recordings::clipping::Clipped;
 use recordings::{Channel, Recording, mean_and_deviation};
 
 /// How to identify.
@@ -285,9 +286,7 @@ pub fn identify(
 
 /// Refuses a recording whose channels stay at their limits: it says nothing of what is beyond.
 fn refuse_clipped(recording: &Recording) -> Result<(), IdentificationError> {
-    /// Samples in a row at the largest or smallest value that are no chance, and the part of all samples that is
-    /// too much.
-    const RUN: usize = 4;
+    /// The part of all samples that is too much.
     const MOST: f64 = 0.05;
     let channels = [
         Channel::ValveCommand,
@@ -299,22 +298,10 @@ fn refuse_clipped(recording: &Recording) -> Result<(), IdentificationError> {
         let Some(values) = recording.channel(channel) else {
             continue;
         };
-        let (low, high) = values
-            .iter()
-            .fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
-        let (mut run, mut clipped) = (0, 0);
-        for value in values {
-            run = if *value == low || *value == high {
-                run + 1
-            } else {
-                0
-            };
-            clipped += match run {
-                0..RUN => 0,
-                RUN => RUN,
-                _ => 1,
-            };
-        }
+        let Clipped {
+            samples: clipped,
+            extremes: [low, high],
+        } = Clipped::of(values, f64::INFINITY);
         if clipped as f64 > MOST * values.len() as f64 {
             let percent = 100.0 * clipped as f64 / values.len() as f64;
             return Err(IdentificationError::Unreadable {

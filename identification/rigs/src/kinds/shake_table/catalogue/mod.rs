@@ -304,6 +304,10 @@ impl ExtensibleModel for ShakeTableModel {
         unseen < UNUSUAL && loudest(&self.noise, &self.stated_noise, self.period) < UNUSUAL
     }
 
+    fn has_noises_of(&self, other: &Self) -> bool {
+        self.noise == other.noise
+    }
+
     fn noise_price(&self) -> f64 {
         let parts = |noise: &Noise| -> usize {
             let coloured = noise.coloured.iter().flatten().chain(&noise.unseen);
