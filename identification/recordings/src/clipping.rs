@@ -14,7 +14,7 @@ const BEYOND: f64 = 2.0;
 /// next one.
 const NEXT: f64 = 3.0;
 
-/// Equal readings in a row that are no chance.
+/// Equal readings in a row that chance does not make.
 pub const RUN: usize = 4;
 
 /// Where a signal was cut off.
