@@ -67,9 +67,7 @@ pub struct Hypothesis {
 impl Hypothesis {
     /// Indices of its effects, ascending.
     pub fn effects(&self) -> Vec<usize> {
-        let mut effects: Vec<_> = self.fit.point.effects.iter().map(|(i, _)| *i).collect();
-        effects.sort_unstable();
-        effects
+        self.fit.point.set()
     }
 
     /// Mean square of its residuals.
@@ -304,8 +302,7 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
             if excess(&runner) > farthest && best.iter().any(strong) {
                 break;
             }
-            let mut set: Vec<usize> = runner.point.effects.iter().map(|(i, _)| *i).collect();
-            set.sort_unstable();
+            let set = runner.point.set();
             if seen.contains(&set) {
                 continue;
             }

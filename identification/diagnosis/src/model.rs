@@ -327,6 +327,13 @@ impl Point {
         rows
     }
 
+    /// Places of its effects among the candidates, in ascending order.
+    pub fn set(&self) -> Vec<usize> {
+        let mut effects: Vec<_> = self.effects.iter().map(|(i, _)| *i).collect();
+        effects.sort_unstable();
+        effects
+    }
+
     /// Number of effect coordinates.
     pub fn effect_coordinates(&self) -> usize {
         self.effects.iter().map(|(_, q)| q.len()).sum()

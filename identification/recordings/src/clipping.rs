@@ -1,8 +1,6 @@
 //! Dwells at a channel's extreme: a clipped sensor's, or those of a converter with coarse steps where the
 //! motion turns.
 
-use super::faults::runs;
-
 /// Samples to either side of a dwell that tell where the signal was going.
 const FLANK: (usize, usize) = (3, 12);
 /// Steps of the converter by which a signal must have been going beyond its extreme: rounding and the noise
@@ -24,6 +22,8 @@ pub struct Clipped {
     pub samples: usize,
     /// The least and the largest reading.
     pub extremes: [f64; 2],
+    /// See [`step`].
+    pub step: f64,
 }
 
 impl Clipped {
@@ -41,8 +41,29 @@ impl Clipped {
         Self {
             samples: cut.map(|(start, end)| end - start).sum(),
             extremes,
+            step,
         }
     }
+}
+
+/// Stretches `first..end` of values that are so.
+pub(super) fn runs(values: &[f64], is: impl Fn(f64) -> bool) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let mut first = None;
+    for (at, &value) in values.iter().enumerate() {
+        match (is(value), first) {
+            (true, None) => first = Some(at),
+            (false, Some(start)) => {
+                found.push((start, at));
+                first = None;
+            }
+            _ => {}
+        }
+    }
+    if let Some(start) = first {
+        found.push((start, values.len()));
+    }
+    found
 }
 
 /// Usual distance between neighbouring levels of `values`: a converter's step where it is coarse.

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::faults::runs;
+use super::clipping::runs;
 use super::{Finding, Recording, RoundedStamps, TimeBase};
 use crate::IdentificationError;
 

@@ -65,26 +65,6 @@ impl Recording {
     }
 }
 
-/// Stretches `first..end` of values that are so.
-pub(super) fn runs(values: &[f64], is: impl Fn(f64) -> bool) -> Vec<(usize, usize)> {
-    let mut found = Vec::new();
-    let mut first = None;
-    for (at, &value) in values.iter().enumerate() {
-        match (is(value), first) {
-            (true, None) => first = Some(at),
-            (false, Some(start)) => {
-                found.push((start, at));
-                first = None;
-            }
-            _ => {}
-        }
-    }
-    if let Some(start) = first {
-        found.push((start, values.len()));
-    }
-    found
-}
-
 fn stuck_runs(values: &[f64]) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     let mut first = 0;

@@ -1,7 +1,7 @@
 //! What makes a recording unfit for a diagnosis, said by name.
 
 use super::nominal::Nominal;
-use recordings::clipping::{Clipped, RUN, step};
+use recordings::clipping::{Clipped, RUN};
 use recordings::{Channel, OUTPUT_NAMES, Recording, RoundedStamps, TimeBase, mean_and_deviation};
 
 /// Shortest recording that is looked at, samples.
@@ -210,7 +210,6 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
         .len()
         .checked_sub(1 + ends)
         .map_or(low, |place| levels[place]);
-    let step = step(values);
     let (mut run, mut start) = (1, 0usize);
     let mut beside = 0;
     for k in 1..=values.len() {
@@ -227,7 +226,7 @@ fn readings(name: &str, channel: &str, values: &[f64], limit: f64) -> Vec<String
         let leaps = || {
             let neighbours = [start.checked_sub(1), Some(k)].into_iter().flatten();
             let mut neighbours = neighbours.filter_map(|place| values.get(place));
-            neighbours.any(|neighbour| (neighbour - value).abs() > LEAP * step)
+            neighbours.any(|neighbour| (neighbour - value).abs() > LEAP * clipped.step)
         };
         if run >= FROZEN_RUN && !is_extreme && leaps() {
             found.push(format!(

@@ -301,6 +301,7 @@ fn refuse_clipped(recording: &Recording) -> Result<(), IdentificationError> {
         let Clipped {
             samples: clipped,
             extremes: [low, high],
+            ..
         } = Clipped::of(values, f64::INFINITY);
         if clipped as f64 > MOST * values.len() as f64 {
             let percent = 100.0 * clipped as f64 / values.len() as f64;
