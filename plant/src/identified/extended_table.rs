@@ -69,7 +69,7 @@ impl ExtendedTableState {
 }
 
 #[inline]
-fn motion(s: &[f64; STATES]) -> TableMotion {
+pub(super) fn motion(s: &[f64; STATES]) -> TableMotion {
     TableMotion {
         displacement: s[3],
         velocity: s[4],
@@ -123,10 +123,7 @@ impl ExtendedTable {
     fn wall_force(&self, s: &[f64; STATES], memory: &Memory) -> f64 {
         let motion = motion(s);
         let (x, v) = (motion.displacement, motion.velocity);
-        s[0] - self.effects.resisting_force(&motion, memory)
-            - self.damping * v
-            - self.stiffness * x
-            - self.effects.table.cubic_stiffness * x * x * x
+        s[0] - self.effects.resisting_force(&motion, memory) - self.damping * v - self.stiffness * x
     }
 
     /// Absolute acceleration of the table under `specimen_force` (N), m/s².

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use crate::ModelError;
 use crate::delay_line::{DelayLine, require_delay};
 use crate::identified::effects::valve::CommandPath;
-use crate::identified::effects::{self, Effects, Memory};
+use crate::identified::effects::{self, Effects, Memory, TableMotion};
 use crate::identified::extended_table::{self, ExtendedTable};
 use crate::identified::shake_table::ShakeTable;
 use crate::integration::runge_kutta_4;
@@ -30,6 +30,8 @@ pub struct IdentifiedRig {
 
 /// Number of continuous states of [`IdentifiedRig`].
 pub const STATES: usize = 16;
+const DISPLACEMENT: usize = 3;
+const VELOCITY: usize = 4;
 const SPOOL: usize = 7;
 const FOUNDATION: usize = 10;
 const SECOND_MODE: usize = 12;
@@ -154,29 +156,183 @@ pub struct SampledRig {
     table: ExtendedTable,
     specimen: ExtendedSpecimen,
     lag_rate: f64,
-    linear: Option<LinearStep>,
+    products: Option<Products>,
 }
 
-/// A sampling period of a rig whose states follow the flow linearly, as one matrix product.
+/// Stages of a Runge-Kutta step.
+const STAGES: usize = 4;
+/// What a step follows from: states, the inputs of both pieces of a period, the resisting force at each stage.
+const CAUSES: usize = STATES + 2 + STAGES;
+
+/// `N` values for a unit of each cause.
+type Responses<const N: usize> = [[f64; N]; CAUSES];
+
+/// Matrix products in the place of the Runge-Kutta steps of a rig whose states follow the flow linearly, but for forces
+/// that resist the table's motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct LinearStep {
-    /// Places of the states that move, the first `count` of them.
+struct Products {
+    /// Places of the states that move, the first `count` of them; displacement and velocity stay in theirs.
     places: [usize; STATES],
     count: usize,
-    /// Row `j` holds the next states for a unit of the state at `places[j]`.
-    from_state: [[f64; STATES]; STATES],
-    /// And for a unit of input in the first and the second piece of the period.
-    from_input: [[f64; STATES]; 2],
     /// The input is what drives the spool; elsewhere it is the flow.
     has_spool: bool,
+    /// Whether a force resists: then there is one for a step of each piece of a period, else the first is that of
+    /// a period.
+    is_resisted: bool,
+    of_piece: [Product; 2],
 }
 
-impl LinearStep {
-    /// From unit perturbations of `sampled`, so that it takes the same steps; none for a rig that is not
-    /// linear behind the valve's openings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Product {
+    /// How often it is used in a period.
+    times: usize,
+    next: Responses<STATES>,
+    /// Displacement and velocity at the second and further stages.
+    stages: [Responses<2>; STAGES - 1],
+}
+
+impl Product {
+    /// From unit perturbations of what runs through the states at the second and further stages to the next ones.
+    fn of(
+        times: usize,
+        run: impl Fn(&[f64; STATES], [f64; 2], [f64; STAGES]) -> [[f64; STATES]; STAGES],
+    ) -> Self {
+        let mut own = Self {
+            times,
+            next: [[0.0; STATES]; CAUSES],
+            stages: [[[0.0; 2]; CAUSES]; STAGES - 1],
+        };
+        for cause in 0..CAUSES {
+            let unit = |first: usize| f64::from(u8::from(cause == first));
+            let ends = run(
+                &std::array::from_fn(unit),
+                std::array::from_fn(|i| unit(STATES + i)),
+                std::array::from_fn(|i| unit(STATES + 2 + i)),
+            );
+            for (stage, at) in own.stages.iter_mut().zip(ends) {
+                stage[cause] = [at[DISPLACEMENT], at[VELOCITY]];
+            }
+            own.next[cause] = ends[STAGES - 1];
+        }
+        own
+    }
+
+    /// Takes the step: the first `N` of `s`.
+    #[inline]
+    fn advance<const N: usize>(
+        &self,
+        s: [f64; N],
+        inputs: [f64; 2],
+        resistance: Option<impl Fn([f64; 2]) -> f64>,
+    ) -> [f64; N] {
+        let mut forces = [0.0; STAGES];
+        if let Some(resistance) = &resistance {
+            forces[0] = resistance([s[DISPLACEMENT], s[VELOCITY]]);
+            for (i, responses) in self.stages.iter().enumerate() {
+                forces[i + 1] = resistance(sum(responses, &s, &inputs, &forces[..=i]));
+            }
+        }
+        let count = if resistance.is_some() { STAGES } else { 0 };
+        sum(&self.next, &s, &inputs, &forces[..count])
+    }
+}
+
+/// The first `N` values that follow from all causes.
+#[inline]
+fn sum<const N: usize, const M: usize>(
+    responses: &Responses<M>,
+    states: &[f64],
+    inputs: &[f64; 2],
+    forces: &[f64],
+) -> [f64; N] {
+    let mut sum = [0.0; N];
+    let inputs = responses[STATES..].iter().zip(inputs);
+    let forces = responses[STATES + 2..].iter().zip(forces);
+    for (row, cause) in inputs.chain(forces).chain(responses.iter().zip(states)) {
+        for i in 0..N {
+            sum[i] += row[i] * cause;
+        }
+    }
+    sum
+}
+
+/// Rates of the states that move by a unit of each of them, of the input and of the resisting force.
+struct Flow {
+    count: usize,
+    by_state: [[f64; STATES]; STATES],
+    by_input: [f64; STATES],
+    by_force: [f64; STATES],
+}
+
+impl Flow {
+    /// Of a linear `rig` and its `active` states, which come first.
+    fn of(rig: IdentifiedRig, active: &[usize]) -> Self {
+        let rates = |rig: IdentifiedRig, place: Option<usize>, input: f64| {
+            let mut state = [0.0; STATES];
+            if let Some(place) = place {
+                state[place] = 1.0;
+            }
+            let sampled = SampledRig::stepwise(rig, 1.0, 1);
+            let rates = sampled.derivative(&state, &Memory::default(), 0.0, input);
+            let mut packed = [0.0; STATES];
+            for (own, &place) in packed.iter_mut().zip(active) {
+                *own = rates[place];
+            }
+            packed
+        };
+        let mut by_state = [[0.0; STATES]; STATES];
+        for (row, &place) in by_state.iter_mut().zip(active) {
+            *row = rates(rig, Some(place), 0.0);
+        }
+        // A damper resists, too; a strong one leaves no rounding.
+        let damping = 1e6;
+        let mut damped = rig;
+        damped.effects.table.viscous_damping += damping;
+        let damped = rates(damped, Some(VELOCITY), 0.0);
+        Self {
+            count: active.len(),
+            by_state,
+            by_input: rates(rig, None, 1.0),
+            by_force: std::array::from_fn(|i| (damped[i] - by_state[VELOCITY][i]) / damping),
+        }
+    }
+
+    fn rates(&self, s: &[f64; STATES], input: f64, force: f64) -> [f64; STATES] {
+        std::array::from_fn(|i| {
+            let states = self.by_state.iter().zip(s).take(self.count);
+            let states: f64 = states.map(|(row, own)| row[i] * own).sum();
+            states + self.by_input[i] * input + self.by_force[i] * force
+        })
+    }
+
+    /// A Runge-Kutta step of fourth order, of `h` s, with the resisting force given at each stage: the states at the
+    /// second and further stages, then the next ones.
+    fn step(
+        &self,
+        s: &[f64; STATES],
+        input: f64,
+        forces: [f64; STAGES],
+        h: f64,
+    ) -> [[f64; STATES]; STAGES] {
+        let moved = |rates: &[f64; STATES], h: f64| std::array::from_fn(|i| s[i] + h * rates[i]);
+        let first = self.rates(s, input, forces[0]);
+        let at_second = moved(&first, 0.5 * h);
+        let second = self.rates(&at_second, input, forces[1]);
+        let at_third = moved(&second, 0.5 * h);
+        let third = self.rates(&at_third, input, forces[2]);
+        let at_fourth = moved(&third, h);
+        let fourth = self.rates(&at_fourth, input, forces[3]);
+        let mean =
+            std::array::from_fn(|i| (first[i] + 2.0 * (second[i] + third[i]) + fourth[i]) / 6.0);
+        [at_second, at_third, at_fourth, moved(&mean, h)]
+    }
+}
+
+impl Products {
+    /// Of `sampled`; none for a rig that is not linear behind the valve's openings but for what resists the table.
     fn of(sampled: &SampledRig) -> Option<Self> {
         let mut rig = sampled.rig;
-        let linear = rig.linear_part();
+        let linear = rig.linear_part().effects;
         let valve = &mut rig.effects.valve;
         let has_spool = valve.spool_frequency > 0.0;
         let openings = [
@@ -193,63 +349,90 @@ impl LinearStep {
         valve.dead_band = 0.0;
         valve.asymmetry = 0.0;
         valve.spool_limit = 0.0;
-        if rig.effects != linear.effects {
+        let is_resisted = rig.effects != linear;
+        rig.effects = rig.effects.without_resistance();
+        if rig.effects != linear.without_resistance() {
             return None;
         }
         if !has_spool {
             rig.effects.valve.flow_gain = 0.0;
         }
-        let unit = SampledRig::stepwise(rig, sampled.period, sampled.substeps);
-        let pieces = CommandPath::default().advance(&rig.effects.valve, 0.0, sampled.period);
-        let after = |mut state: IdentifiedRigState, inputs: [f64; 2]| {
-            for ((_, duration), input) in pieces.into_iter().zip(inputs) {
-                unit.piece(&mut state, input, duration);
-            }
-            state.continuous
-        };
         let active = rig.active_states();
+        let flow = Flow::of(rig, &active);
+        let pieces = CommandPath::default().advance(&rig.effects.valve, 0.0, sampled.period);
+        let steps = pieces.map(|(_, duration)| duration / sampled.substeps as f64);
+        let of_piece = if is_resisted {
+            [0, 1].map(|piece| {
+                let times = if steps[piece] > 0.0 {
+                    sampled.substeps
+                } else {
+                    0
+                };
+                Product::of(times, |s, inputs, forces| {
+                    flow.step(s, inputs[piece], forces, steps[piece])
+                })
+            })
+        } else {
+            let whole = Product::of(1, |s, inputs, _| {
+                let mut ends = [*s; STAGES];
+                for (input, h) in inputs.into_iter().zip(steps) {
+                    for _ in 0..sampled.substeps {
+                        ends = flow.step(&ends[STAGES - 1], input, [0.0; STAGES], h);
+                    }
+                }
+                ends
+            });
+            [whole, Product { times: 0, ..whole }]
+        };
         let mut places = [0; STATES];
         places[..active.len()].copy_from_slice(&active);
-        let packed = |next: [f64; STATES]| {
-            let mut row = [0.0; STATES];
-            for (own, &place) in row.iter_mut().zip(&active) {
-                *own = next[place];
-            }
-            row
-        };
-        let mut from_state = [[0.0; STATES]; STATES];
-        for (row, &place) in from_state.iter_mut().zip(&active) {
-            let mut state = IdentifiedRigState::default();
-            state.continuous[place] = 1.0;
-            *row = packed(after(state, [0.0; 2]));
-        }
-        let at_rest = IdentifiedRigState::default();
         Some(Self {
             places,
             count: active.len(),
-            from_state,
-            from_input: [[1.0, 0.0], [0.0, 1.0]].map(|inputs| packed(after(at_rest, inputs))),
             has_spool,
+            is_resisted,
+            of_piece,
         })
     }
 
-    /// The next of the states that move, under the inputs of both pieces.
+    /// A period under the inputs of both its pieces.
     #[inline]
-    fn advance<const N: usize>(&self, s: &mut [f64; STATES], inputs: [f64; 2]) {
-        let mut next = [0.0; N];
-        for (row, input) in self.from_input.iter().zip(inputs) {
-            for i in 0..N {
-                next[i] += row[i] * input;
+    fn advance<const N: usize>(
+        &self,
+        effects: &Effects,
+        state: &mut IdentifiedRigState,
+        inputs: [f64; 2],
+    ) {
+        let places = &self.places[..self.count];
+        for product in &self.of_piece {
+            for _ in 0..product.times {
+                let mut own = [0.0; N];
+                for (own, place) in own.iter_mut().zip(places) {
+                    *own = state.continuous[place % STATES];
+                }
+                let memory = &mut state.memory;
+                let resistance = |[displacement, velocity]: [f64; 2]| {
+                    let motion = TableMotion {
+                        displacement,
+                        velocity,
+                    };
+                    effects.resisting_force(&motion, memory)
+                };
+                let next = product.advance(own, inputs, self.is_resisted.then_some(resistance));
+                for (own, place) in next.iter().zip(places) {
+                    state.continuous[place % STATES] = *own;
+                }
+                if self.is_resisted {
+                    let [displacement, velocity] = [next[DISPLACEMENT], next[VELOCITY]];
+                    effects.remember(
+                        memory,
+                        &TableMotion {
+                            displacement,
+                            velocity,
+                        },
+                    );
+                }
             }
-        }
-        for (row, place) in self.from_state.iter().zip(&self.places[..self.count]) {
-            let own = s[place % STATES];
-            for i in 0..N {
-                next[i] += row[i] * own;
-            }
-        }
-        for (own, place) in next.iter().zip(&self.places[..self.count]) {
-            s[place % STATES] = *own;
         }
     }
 }
@@ -275,7 +458,7 @@ fn of_specimen(s: &[f64; STATES]) -> [f64; extended_specimen::STATES] {
 impl SampledRig {
     fn new(rig: IdentifiedRig, period: f64, substeps: usize) -> Self {
         let mut sampled = Self::stepwise(rig, period, substeps);
-        sampled.linear = LinearStep::of(&sampled);
+        sampled.products = Products::of(&sampled);
         sampled
     }
 
@@ -288,7 +471,7 @@ impl SampledRig {
             table: ExtendedTable::new(&rig.shake_table, &rig.effects),
             specimen: ExtendedSpecimen::new(rig.specimen, &rig.effects.specimen),
             lag_rate: TAU * rig.sensors.displacement.corner,
-            linear: None,
+            products: None,
         }
     }
 
@@ -331,16 +514,16 @@ impl SampledRig {
         let valve = &self.rig.effects.valve;
         let w = state.disturbance;
         let pieces = state.path.advance(valve, command, self.period);
-        if let Some(linear) = &self.linear {
-            let input = |(drive, _): (f64, f64)| match linear.has_spool {
+        if let Some(products) = &self.products {
+            let input = |(drive, _): (f64, f64)| match products.has_spool {
                 true => drive + w,
                 false => valve.flow(drive + w),
             };
             let inputs = pieces.map(input);
-            if linear.count <= 8 {
-                linear.advance::<8>(&mut state.continuous, inputs);
+            if products.count <= 8 {
+                products.advance::<8>(&self.rig.effects, state, inputs);
             } else {
-                linear.advance::<STATES>(&mut state.continuous, inputs);
+                products.advance::<STATES>(&self.rig.effects, state, inputs);
             }
             state.peak_drift = state.peak_drift.max(state.continuous[5].abs());
             return;
@@ -465,9 +648,9 @@ mod tests {
     }
 
     #[test]
-    fn one_product_a_sample_is_the_integration_where_the_rig_is_linear_behind_the_valve() {
+    fn products_are_the_integration_where_the_rig_is_linear_but_for_openings_and_resistance() {
         type Turn = fn(&mut IdentifiedRig);
-        let linear: [Turn; 6] = [
+        let linear: [Turn; 9] = [
             |_| (),
             |rig| rig.effects.valve.dead_band = 0.05,
             |rig| {
@@ -488,6 +671,22 @@ mod tests {
                 rig.effects.valve.spool_limit = 0.8;
                 rig.effects.hydraulics.leakage = 1e-3;
             },
+            |rig| {
+                rig.effects.friction.coulomb_force = 5.0;
+                rig.effects.valve.dead_band = 0.05;
+                rig.effects.fading_friction.coulomb_force = 2.0;
+            },
+            |rig| {
+                rig.effects.presliding_friction.coulomb_force = 5.0;
+                rig.effects.foundation.frequency = 12.0;
+                rig.effects.table.cubic_stiffness = 1e6;
+            },
+            |rig| {
+                rig.effects.friction.stribeck_force = 5.0;
+                rig.effects.directional_friction.coulomb_force = 3.0;
+                rig.effects.valve.command_delay = 3.4 * PERIOD;
+                rig.effects.valve.spool_frequency = 30.0;
+            },
         ];
         for turn in linear {
             let mut rig = IdentifiedRig {
@@ -496,7 +695,7 @@ mod tests {
             };
             turn(&mut rig);
             let product = rig.sample(PERIOD, 2).unwrap();
-            assert!(product.linear.is_some());
+            assert!(product.products.is_some());
             let stepwise = SampledRig::stepwise(rig, PERIOD, 2);
             let (mut one, mut other) =
                 (IdentifiedRigState::default(), IdentifiedRigState::default());
@@ -514,8 +713,11 @@ mod tests {
             }
         }
         let nonlinear: [Turn; 3] = [
-            |rig| rig.effects.friction.coulomb_force = 5.0,
-            |rig| rig.effects.hydraulics.stall_force = 300.0,
+            |rig| {
+                rig.effects.friction.coulomb_force = 5.0;
+                rig.effects.hydraulics.stall_force = 300.0;
+            },
+            |rig| rig.effects.hydraulics.droop_loss = 0.2,
             |rig| {
                 rig.effects.valve.spool_frequency = 30.0;
                 rig.effects.valve.dead_band = 0.05;
@@ -524,7 +726,7 @@ mod tests {
         for turn in nonlinear {
             let mut rig = IdentifiedRig::default();
             turn(&mut rig);
-            assert!(rig.sample(PERIOD, 2).unwrap().linear.is_none());
+            assert!(rig.sample(PERIOD, 2).unwrap().products.is_none());
         }
     }
 

@@ -77,6 +77,10 @@ impl Family for DirectionalFriction {
         self.coulomb_force != 0.0 || self.difference != 0.0
     }
 
+    fn without_resistance(self) -> Self {
+        Self::default()
+    }
+
     #[inline]
     fn resisting_force(&self, motion: &TableMotion, (): &()) -> f64 {
         if !self.is_active() {

@@ -97,6 +97,10 @@ impl Family for FadingFriction {
         self.coulomb_force != 0.0
     }
 
+    fn without_resistance(self) -> Self {
+        Self::default()
+    }
+
     #[inline]
     fn resisting_force(&self, motion: &TableMotion, greatest: &f64) -> f64 {
         if !self.is_active() {

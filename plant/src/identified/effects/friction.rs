@@ -150,6 +150,10 @@ impl Family for FrictionEffects {
         self.coulomb_force != 0.0 || self.stribeck_force != 0.0
     }
 
+    fn without_resistance(self) -> Self {
+        Self::default()
+    }
+
     #[inline]
     fn resisting_force(&self, motion: &TableMotion, (): &()) -> f64 {
         if !self.is_active() {

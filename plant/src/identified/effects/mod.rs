@@ -50,6 +50,15 @@ pub trait Family {
         0.0
     }
 
+    /// These without those that act by [`Self::resisting_force`] alone. A family that does not say so is slower to
+    /// simulate.
+    fn without_resistance(self) -> Self
+    where
+        Self: Sized,
+    {
+        self
+    }
+
     /// Takes in where the table has come to after a step.
     #[inline]
     fn remember(&self, memory: &mut Self::Memory, motion: &TableMotion) {
@@ -98,6 +107,11 @@ macro_rules! families {
             #[inline]
             pub fn resisting_force(&self, motion: &TableMotion, memory: &Memory) -> f64 {
                 0.0 $(+ self.$name.resisting_force(motion, &memory.$name))*
+            }
+
+            /// These without those that act by [`Self::resisting_force`] alone.
+            pub fn without_resistance(self) -> Self {
+                Self { $($name: self.$name.without_resistance(),)* }
             }
 
             /// Takes in where the table has come to after a step.

@@ -106,6 +106,10 @@ impl Family for PreslidingFriction {
         self.coulomb_force != 0.0
     }
 
+    fn without_resistance(self) -> Self {
+        Self::default()
+    }
+
     #[inline]
     fn resisting_force(&self, motion: &TableMotion, memory: &[f64; 2]) -> f64 {
         if !self.is_active() {

@@ -1,7 +1,7 @@
 //! What the table carries and rubs against beyond Eq 2-5.
 
 use super::quantity::{CUBIC_STIFFNESS, DAMPING, MASS};
-use super::{AtStart, Component, Effect, Family, Parameter};
+use super::{AtStart, Component, Effect, Family, Parameter, TableMotion};
 use crate::ModelError;
 use units::constants::{INCH, LBF, LBF_S_PER_INCH, LBF_S2_PER_INCH};
 use units::vocabulary;
@@ -72,6 +72,18 @@ impl Family for TableEffects {
         [self.added_mass, self.viscous_damping, self.cubic_stiffness]
             .into_iter()
             .any(|size| size != 0.0)
+    }
+
+    #[inline]
+    fn resisting_force(&self, motion: &TableMotion, (): &()) -> f64 {
+        self.cubic_stiffness * motion.displacement.powi(3)
+    }
+
+    fn without_resistance(self) -> Self {
+        Self {
+            cubic_stiffness: 0.0,
+            ..self
+        }
     }
 
     fn validate(&self) -> Result<(), ModelError> {
