@@ -11,6 +11,8 @@ const ROUNDS: usize = 3;
 const ROUNDS_OF_A_FIT: usize = 4;
 /// Twice the log likelihood below which noises that are learned once more change nothing.
 const NOTHING_NEW: f64 = 20.0;
+/// Share of the residuals' power beyond which a difference between two models is not doubted.
+const BEYOND_DOUBT: f64 = 0.02;
 /// Samples in a block over which unseen likelihoods are summed, as a share of a record.
 const BLOCKS: usize = 40;
 
@@ -25,6 +27,13 @@ pub(super) struct Settled<M> {
     pub hypothesis: Hypothesis,
     /// False where they are those that the fit began with.
     pub has_learned: bool,
+}
+
+impl<M> Settled<M> {
+    /// Difference of scores from it that no other form of a noise makes up for.
+    pub fn beyond_doubt(&self) -> f64 {
+        BEYOND_DOUBT * self.hypothesis.fit.residuals.len() as f64
+    }
 }
 
 /// The model at `start` fitted to `records` under `model`'s noises, then under those that its own
@@ -77,17 +86,20 @@ pub(super) fn settled<M: ExtensibleModel + Clone>(
     Some(best)
 }
 
-/// As [`settled`] from `near`, and from the `assumed` noises where those of `near` may hide what the model
-/// lacks: of both the better.
+/// As [`settled`] under the noises of `near`, and under the `assumed` ones where those may hide what the model
+/// lacks: of both the better. A model that is far worse than `near` is no better known for that.
 pub(super) fn settled_from<M: ExtensibleModel + Clone>(
     assumed: &M,
-    near: &M,
+    near: &Settled<M>,
     start: &Point,
     records: &[usize],
     observer: Observer<'_>,
 ) -> Option<Settled<M>> {
-    let first = settled(near, start, records, observer);
-    if near.has_noises_of(assumed) || first.as_ref().is_some_and(|own| own.model.is_usual()) {
+    let first = settled(&near.model, start, records, observer);
+    let is_known = |own: &Settled<M>| {
+        own.model.is_usual() || own.hypothesis.score - near.hypothesis.score > near.beyond_doubt()
+    };
+    if near.model.has_noises_of(assumed) || first.as_ref().is_some_and(is_known) {
         return first;
     }
     let second = settled(assumed, start, records, observer);
@@ -122,7 +134,7 @@ pub(super) fn ablated<M: ExtensibleModel + Clone>(
                 return None;
             }
             observer.tell(|| Progress::Trying(format!("only {}", named(candidates, &smaller))));
-            settled_from(assumed, &current.model, &smaller, records, observer)
+            settled_from(assumed, &current, &smaller, records, observer)
         };
         let special = places
             .clone()

@@ -1,5 +1,6 @@
 //! Maximum-likelihood fits by Levenberg-Marquardt, with the nuisance estimated along.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -237,6 +238,18 @@ impl Jacobian {
         let predictor = model.predictor(&fit.point)?;
         let further = self.columns.len()..count;
         Some(self.with(columns(model, &predictor, fit, records, further)?))
+    }
+
+    /// These but for some `coordinates`.
+    pub(crate) fn without(&self, coordinates: Range<usize>) -> Self {
+        let kept: Vec<usize> = (0..self.columns.len())
+            .filter(|own| !coordinates.contains(own))
+            .collect();
+        let columns = kept.iter().map(|&own| Arc::clone(&self.columns[own]));
+        Self {
+            columns: columns.collect(),
+            gram: self.gram.select_rows(&kept).select_columns(&kept),
+        }
     }
 
     /// Those on the first `count` residuals.

@@ -384,7 +384,6 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
             }
             seen.push(effect);
             // A size far from nothing, a delay of some samples, may be beyond a ridge.
-            let known = exact;
             let mut points = vec![point];
             if candidates[effect].starts.len() > 1 {
                 let starts = candidates[effect].starts.iter();
@@ -395,18 +394,37 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
                     far
                 }));
             }
-            let short = points
-                .iter()
-                .filter_map(|point| fit(self.model, point, &self.records, known, 2))
-                .min_by(|a, b| a.cost.total_cmp(&b.cost))
-                .and_then(|near| fit(self.model, &near.point, &self.records, known, 4));
-            best.extend(short.and_then(|short| {
-                let known = exact.extended(self.model, &short, &self.records)?;
-                self.sketch(&short, known)
-            }));
+            best.extend(self.best_of(&points, exact));
         }
         best.sort_by(|a, b| a.score.total_cmp(&b.score));
         best
+    }
+
+    /// Effects of `current` become more general ones that contain them, each from the best of its starts.
+    fn generalised(&self, current: &Hypothesis) -> Vec<Hypothesis> {
+        let Some(known) = Jacobian::at(self.model, &current.fit, &self.records) else {
+            return Vec::new();
+        };
+        let cases = general_cases(self.model.candidates(), &current.fit.point);
+        let fitted = cases.iter().filter_map(|(place, points)| {
+            let rest = known.without(current.fit.point.coordinates(*place));
+            self.best_of(points, &rest)
+        });
+        fitted.collect()
+    }
+
+    /// The best of short fits to the first record from `points`, fitted to all: models whose last effect is new beside
+    /// what has the derivatives `known`.
+    fn best_of(&self, points: &[Point], known: &Jacobian) -> Option<Hypothesis> {
+        let track = &self.records[..1];
+        let begin = known.begin(self.model.residual_count(track[0]));
+        let short = |point: &Point, steps| fit(self.model, point, track, &begin, steps);
+        let starts = points.iter().filter_map(|point| short(point, 2));
+        let near = starts.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+        let near = short(&near.point, 4)?;
+        let start = evaluate(self.model, &near.point, &self.records)?;
+        let known = known.extended(self.model, &start, &self.records)?;
+        self.sketch(&start, known)
     }
 }
 
@@ -437,12 +455,7 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
         let candidates = self.model.candidates();
         // What an effect has beyond its special case is asked for where that leaves traces.
         if !current.fit.point.effects.is_empty() && self.leaves_traces(current) {
-            let general = general_cases(candidates, &current.fit.point);
-            level.extend(general.iter().filter_map(|point| {
-                let start = evaluate(self.model, point, &self.records)?;
-                let known = Jacobian::at(self.model, &start, &self.records)?;
-                self.sketch(&start, known)
-            }));
+            level.extend(self.generalised(current));
             level.sort_by(|a, b| a.score.total_cmp(&b.score));
         }
         level.retain(|own| {
@@ -473,15 +486,16 @@ fn is_held(candidates: &[Candidate], base: &Point, effect: usize) -> bool {
         || known.any(|known| known.effect == own.effect || known.contains == Some(own.effect))
 }
 
-/// `point` with one of its effects become a more general one that contains it, from every start of that.
-pub(super) fn general_cases(candidates: &[Candidate], point: &Point) -> Vec<Point> {
+/// `point` with one of its effects become a more general one that contains it, which comes last: the place of each
+/// effect that has some, and all starts of one.
+pub(super) fn general_cases(candidates: &[Candidate], point: &Point) -> Vec<(usize, Vec<Point>)> {
     let mut all = Vec::new();
     for (place, (index, internal)) in point.effects.iter().enumerate() {
         let special = &candidates[*index];
         let known = special.values(internal);
-        let contains = |general: &&(usize, &Candidate)| general.1.contains == Some(special.effect);
-        let numbered: Vec<(usize, &Candidate)> = candidates.iter().enumerate().collect();
-        for (general, candidate) in numbered.iter().filter(contains) {
+        let numbered = candidates.iter().enumerate();
+        for (general, candidate) in numbered.filter(|own| own.1.contains == Some(special.effect)) {
+            let mut points: Vec<Point> = Vec::new();
             for start in &candidate.starts {
                 let mut values = start.clone();
                 for (value, parameter) in values.iter_mut().zip(&candidate.parameters) {
@@ -491,11 +505,13 @@ pub(super) fn general_cases(candidates: &[Candidate], point: &Point) -> Vec<Poin
                     }
                 }
                 let mut next = point.clone();
-                next.effects[place] = (*general, candidate.internal(&values));
-                if !all.contains(&next) {
-                    all.push(next);
+                next.effects.remove(place);
+                next.effects.push((general, candidate.internal(&values)));
+                if !points.contains(&next) {
+                    points.push(next);
                 }
             }
+            all.push((place, points));
         }
     }
     all

@@ -1,5 +1,7 @@
 //! What the engine knows of a rig: parameters, candidates, whitened residuals.
 
+use std::ops::Range;
+
 /// A rig with records, as the engine sees it. A new rig is one implementation of this.
 pub trait ExtensibleModel: Sync {
     /// What stays fixed while derivatives are taken (a predictor's gain).
@@ -337,6 +339,13 @@ impl Point {
     /// Number of effect coordinates.
     pub fn effect_coordinates(&self) -> usize {
         self.effects.iter().map(|(_, q)| q.len()).sum()
+    }
+
+    /// Coordinates of the effect at `place`.
+    pub(crate) fn coordinates(&self, place: usize) -> Range<usize> {
+        let sizes = self.effects[..place].iter().map(|(_, q)| q.len());
+        let begin = self.nuisance.len() + sizes.sum::<usize>();
+        begin..begin + self.effects[place].1.len()
     }
 
     /// The step from here to `other`, which has the same effects: nuisance first, then the effects'.

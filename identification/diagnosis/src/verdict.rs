@@ -10,6 +10,7 @@ use super::likelihood::{
 use super::model::{Candidate, ExtensibleModel, Point, Role, Scale};
 use super::progress::{Observer, Progress, Step};
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
 
 /// No name is surer than hidden effects in worlds of another form have shown, of which too few were judged for
 /// more (docs/diagnosis.md). In those of the engine's own form 233 of 234 names were right.
@@ -24,8 +25,6 @@ const STEADY: f64 = 0.5;
 const ROUNDS_OF_DOUBT: usize = 4;
 /// Standard deviations by which an effect predicts unseen records worse than the model without it, and goes.
 const REFUTED: f64 = 3.0;
-/// Share of the residuals' power beyond which an effect is not doubted for that.
-const BEYOND_DOUBT: f64 = 0.02;
 /// Share of the excess error that a single effect explains to lead what is ranked.
 const MOST_OF_IT: f64 = 0.9;
 /// Share beyond which a single burst that is left says nothing of the model.
@@ -234,18 +233,19 @@ pub fn judge<M: ExtensibleModel + Clone>(
         quiet: at_rest.as_ref().unwrap_or(&*model),
         records: fitted,
         observer,
+        extended: RefCell::default(),
     };
     let origin = Point {
         nuisance: vec![0.0; model.nuisance()],
         effects: Vec::new(),
     };
-    let nominal = rounds.settled(rounds.quiet, &origin)?;
+    let nominal = rounds.settled(None, &origin)?;
     let (best, others) = rounds.search(nominal, FLOOR);
     let mut best = rounds.steady(best);
     let mut judgement = weigh(&best, &others, fitted, held_out, observer)?;
     while let Some(place) = refuted(&judgement.unseen_gains) {
         let smaller = ablation::without(&best.hypothesis.fit.point, place);
-        let Some(smaller) = rounds.settled(&best.model, &smaller) else {
+        let Some(smaller) = rounds.settled(Some(&best), &smaller) else {
             break;
         };
         best = smaller;
@@ -318,11 +318,18 @@ struct Rounds<'a, M> {
     quiet: &'a M,
     records: &'a [usize],
     observer: Observer<'a>,
+    /// Sets of effects that were extended by further ones.
+    extended: RefCell<Vec<Vec<usize>>>,
 }
 
 impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
-    fn settled(&self, near: &M, start: &Point) -> Option<Settled<M>> {
-        let found = settled_from(self.assumed, near, start, self.records, self.observer)?;
+    /// The model at `start` under its own noises; in the beginning no model is `near`.
+    fn settled(&self, near: Option<&Settled<M>>, start: &Point) -> Option<Settled<M>> {
+        let (records, observer) = (self.records, self.observer);
+        let found = match near {
+            Some(near) => settled_from(self.assumed, near, start, records, observer),
+            None => settled(self.quiet, start, records, observer),
+        }?;
         let selection = PenalisedLikelihood::of(&found.model, self.records, self.observer);
         selection.tell(Step::Refitted, &found.hypothesis);
         Some(found)
@@ -330,18 +337,19 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
 
     /// From `start` as long as an effect pays, then without what does not; and the rivals of the last round.
     fn search(&self, start: Settled<M>, floor: f64) -> (Settled<M>, Vec<Hypothesis>) {
+        let effects = start.hypothesis.effects();
         let mut current = start;
         let mut others: Vec<Settled<M>> = Vec::new();
         while current.hypothesis.effects().len() < MOST_EFFECTS && !self.observer.is_over() {
             let mut tried: Vec<Settled<M>> = self
-                .proposals(&current, floor)
+                .proposals(&current, floor, &[])
                 .iter()
                 .filter_map(|point| {
                     self.observer.tell(|| {
                         let what = named(self.assumed.candidates(), point);
                         Progress::Trying(format!("{what} under its own noises"))
                     });
-                    self.settled(&current.model, point)
+                    self.settled(Some(&current), point)
                 })
                 .filter(|own| {
                     let point = &own.hypothesis.fit.point;
@@ -363,6 +371,9 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
             others = tried;
         }
         let mut others: Vec<Hypothesis> = others.into_iter().map(|own| own.hypothesis).collect();
+        if current.hypothesis.effects() == effects {
+            return (current, others);
+        }
         let mut exchanges = 0..EXCHANGES;
         loop {
             let (best, simpler) = ablated(self.assumed, current, self.records, self.observer);
@@ -391,24 +402,31 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
             return None;
         }
         for simpler in simpler.iter().flatten() {
-            let mut proposed = self.proposals(simpler, floor).into_iter();
-            let proposed = proposed.find(|point| !known.contains(&point.set()));
-            let Some(point) = proposed.filter(|_| !self.observer.is_over()) else {
+            if self
+                .extended
+                .borrow()
+                .contains(&simpler.hypothesis.effects())
+            {
                 continue;
-            };
-            self.observer.tell(|| {
-                let what = named(self.assumed.candidates(), &point);
-                Progress::Trying(format!("{what} in its place"))
-            });
-            let Some(own) = self.settled(&simpler.model, &point) else {
-                continue;
-            };
-            if own.hypothesis.score < best.hypothesis.score {
-                others.push(best.hypothesis.clone());
-                return Some(own);
             }
-            known.push(own.hypothesis.effects());
-            others.push(own.hypothesis);
+            for point in self.proposals(simpler, floor, &known) {
+                if self.observer.is_over() {
+                    break;
+                }
+                self.observer.tell(|| {
+                    let what = named(self.assumed.candidates(), &point);
+                    Progress::Trying(format!("{what} in its place"))
+                });
+                let Some(own) = self.settled(Some(simpler), &point) else {
+                    continue;
+                };
+                if own.hypothesis.score < best.hypothesis.score {
+                    others.push(best.hypothesis.clone());
+                    return Some(own);
+                }
+                known.push(own.hypothesis.effects());
+                others.push(own.hypothesis);
+            }
         }
         None
     }
@@ -422,15 +440,12 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
                 let what = named(self.assumed.candidates(), &smaller);
                 Progress::Trying(format!("only {what}"))
             });
-            let model = &found.model;
-            let Some(smaller) =
-                settled_from(self.assumed, model, &smaller, self.records, self.observer)
+            let (records, observer) = (self.records, self.observer);
+            let Some(smaller) = settled_from(self.assumed, &found, &smaller, records, observer)
             else {
                 break;
             };
-            let earned = smaller.hypothesis.score - found.hypothesis.score;
-            let residuals = found.hypothesis.fit.residuals.len() as f64;
-            if earned > BEYOND_DOUBT * residuals {
+            if smaller.hypothesis.score - found.hypothesis.score > found.beyond_doubt() {
                 break;
             }
             found = smaller;
@@ -478,8 +493,10 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
         alone.max_by(|a, b| a.explains.total_cmp(&b.explains))
     }
 
-    /// Models with one more effect than `current`, the most promising first.
-    fn proposals(&self, current: &Settled<M>, floor: f64) -> Vec<Point> {
+    /// Models with one more effect than `current` that are not `known`, the most promising first.
+    fn proposals(&self, current: &Settled<M>, floor: f64, known: &[Vec<usize>]) -> Vec<Point> {
+        let effects = current.hypothesis.effects();
+        self.extended.borrow_mut().push(effects);
         let under = |model: &M, current: &Hypothesis| -> Vec<Point> {
             let mut selection = PenalisedLikelihood::of(model, self.records, self.observer);
             selection.floor = floor;
@@ -489,7 +506,8 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
             level.truncate(gains.iter().filter(|gain| **gain > NEAR * best).count());
             let most = PROPOSED.saturating_sub(current.effects().len()).max(1);
             let level = level.into_iter().map(|own| own.fit.point);
-            level.take(most).collect()
+            let new = level.filter(|point| !known.contains(&point.set()));
+            new.take(most).collect()
         };
         let mut all = Vec::new();
         if !current.model.is_usual() || current.hypothesis.mean_square() > NEAR_NOISE {
