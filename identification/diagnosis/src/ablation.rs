@@ -117,15 +117,20 @@ pub(super) fn without(point: &Point, place: usize) -> Point {
 }
 
 /// `found` without the effects, or what they have beyond their special cases, that do not earn their price
-/// once the noises may take their place; and the models without each of those that stay.
+/// once the noises may take their place; and the models without each of those that stay. Those of the set `kept` have
+/// earned it already.
 pub(super) fn ablated<M: ExtensibleModel + Clone>(
     assumed: &M,
     found: Settled<M>,
+    kept: &[usize],
     records: &[usize],
     observer: Observer<'_>,
 ) -> (Settled<M>, Vec<Option<Settled<M>>>) {
     let mut current = found;
     loop {
+        if current.hypothesis.effects() == kept {
+            return (current, Vec::new());
+        }
         let candidates = current.model.candidates();
         let point = &current.hypothesis.fit.point;
         let places = 0..point.effects.len();

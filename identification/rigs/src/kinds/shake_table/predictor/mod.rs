@@ -20,6 +20,9 @@ pub use learning::{Innovations, Learned, learn};
 use linear::Linear;
 pub use noise::{Disturbance, Noise, total};
 
+/// Sampling period beyond which friction and a fast spool get two steps a sample, s: 1 kHz needs none finer.
+const LONGEST_FAST_STEP: f64 = 1.1e-3;
+
 /// Kalman gain and whitening for one rig and one sampling period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Predictor {
@@ -204,7 +207,8 @@ impl Predictor {
     /// # Errors
     /// A rig that cannot be simulated.
     pub fn sample(&self, rig: &IdentifiedRig) -> Result<SampledRig, ModelError> {
-        rig.sample(self.period, if rig.is_fast() { 2 } else { 1 })
+        let is_long = self.period > LONGEST_FAST_STEP;
+        rig.sample(self.period, if is_long && rig.is_fast() { 2 } else { 1 })
     }
 }
 
