@@ -10,6 +10,7 @@ mod model;
 mod opening;
 mod progress;
 pub mod resampling;
+mod rounds;
 mod search;
 mod verdict;
 

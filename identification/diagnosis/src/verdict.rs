@@ -1,28 +1,21 @@
 //! From a search to a verdict: is the best model adequate, and does anything rival it?
 
-use super::ablation::{self, Settled, ablated, settled, settled_from};
+use super::ablation::{self, Settled, settled};
 use super::adequacy::{Test, left_over};
 use super::fit::{Fit, Jacobian, evaluate, fit as refit, polish};
 use super::likelihood::{
-    FLOOR, Hypothesis, MOST_EFFECTS, NEAR_NOISE, NEARLY_NOISE, PenalisedLikelihood, RIVAL_WITHIN,
-    ROUNDS, SETTLED, lacks, matters, named, pays,
+    FLOOR, Hypothesis, NEAR_NOISE, NEARLY_NOISE, PenalisedLikelihood, RIVAL_WITHIN, ROUNDS,
+    SETTLED, lacks, matters,
 };
 use super::model::{Candidate, ExtensibleModel, Point, Role, Scale};
-use super::progress::{Observer, Progress, Step};
+use super::progress::Observer;
+use super::rounds::Rounds;
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 
 /// No name is surer than hidden effects in worlds of another form have shown, of which too few were judged for
 /// more (docs/diagnosis.md). In those of the engine's own form 233 of 234 names were right.
 pub const SUREST: f64 = 0.95;
-/// Extensions that are fitted under noises of their own, in the first round; one less in each further.
-const PROPOSED: usize = 3;
-/// Share of what the best of them gains that they gain at least.
-const NEAR: f64 = 0.5;
-/// Share of its size that an effect keeps where the predictor follows the records less closely.
-const STEADY: f64 = 0.5;
-/// Rounds of the fit that asks for it.
-const ROUNDS_OF_DOUBT: usize = 4;
 /// Standard deviations by which an effect predicts unseen records worse than the model without it, and goes.
 const REFUTED: f64 = 3.0;
 /// Standard errors by which a size of an effect that is named differs from zero at least. Of 73 effects that were named
@@ -37,8 +30,6 @@ const NEARLY_ALL: f64 = 0.99;
 /// form leave a little. In worlds of that kind three right models left 5.6 to 8.1 deviations (`judge_tables`, seeds 6000
 /// and 7000). Correlations with the motion stay as usual: a wrong model left 7.8 in one (8085).
 const LEFT_BY_FORM: f64 = 1.5;
-/// Times that an effect of the best model gives its place to another one.
-const EXCHANGES: usize = 2;
 /// Models that are reported with their weights at most.
 const CANDIDATES: usize = 5;
 
@@ -245,12 +236,12 @@ pub fn judge<M: ExtensibleModel + Clone>(
     };
     let nominal = rounds.settled(None, &origin)?;
     let (best, others) = rounds.search(nominal, FLOOR);
-    let (mut best, mut judgement) = rounds.weighed(best, &others, held_out)?;
+    let (mut best, mut judgement) = weighed(&rounds, best, &others, held_out)?;
     let is_near = best.model.is_usual() && best.hypothesis.mean_square() < NEAR_NOISE;
     if judgement.verdict == Verdict::Unexplained && is_near && !observer.is_over() {
         // Too weak to matter, but perhaps all that is left.
         let (weak, rivals) = rounds.search(best.clone(), 0.0);
-        let (weak, again) = rounds.weighed(weak, &rivals, held_out)?;
+        let (weak, again) = weighed(&rounds, weak, &rivals, held_out)?;
         if matches!(again.verdict, Verdict::Named | Verdict::Ambiguous) {
             let strong = matters(model.candidates(), &again.best.point, FLOOR);
             judgement = Judgement {
@@ -265,7 +256,7 @@ pub fn judge<M: ExtensibleModel + Clone>(
         }
     }
     if judgement.verdict == Verdict::Unexplained && !observer.is_over() {
-        let core = rounds.core(&best.hypothesis.fit.point);
+        let core = core(&rounds, &best.hypothesis.fit.point);
         if let Some(core) = core.filter(|core| core.explains > MOST_OF_IT) {
             let names = |own: &WeighedModel| -> Vec<&str> {
                 own.effects.iter().map(|effect| effect.effect).collect()
@@ -282,18 +273,6 @@ pub fn judge<M: ExtensibleModel + Clone>(
         judgement.verdict = Verdict::Unexplained;
     }
     Some(judgement)
-}
-
-/// Whether an effect's sizes, at coordinates `own`, are less than half of that at `again`, or of another sign.
-fn has_shrunk(candidate: &Candidate, own: &[f64], again: &[f64]) -> bool {
-    let parameters = candidate.parameters.iter().zip(own).zip(again);
-    let mut sizes = parameters
-        .filter(|((parameter, _), _)| {
-            matches!(parameter.role, Role::Size { .. }) && parameter.scale != Scale::Logarithmic
-        })
-        .map(|((_, own), again)| again * own.signum() < STEADY * own.abs())
-        .peekable();
-    sizes.peek().is_some() && sizes.all(|shrunk| shrunk)
 }
 
 /// The place of the effect with which unseen records are predicted worst, where that is worse than without it.
@@ -325,248 +304,52 @@ fn unsure(candidates: &[Candidate], point: &Point, effects: &[NamedEffect]) -> O
     (worst.1 < SURE).then_some(worst.0)
 }
 
-/// A search in rounds.
-struct Rounds<'a, M> {
-    /// The model with the noises that were stated.
-    assumed: &'a M,
-    /// With those of the quiet records.
-    quiet: &'a M,
-    records: &'a [usize],
-    observer: Observer<'a>,
-    /// Sets of effects that were extended by further ones.
-    extended: RefCell<Vec<Vec<usize>>>,
+/// What is `found`, judged, without the effects that unseen records refute and without those that would be named
+/// though they may not be there.
+fn weighed<M: ExtensibleModel + Clone>(
+    rounds: &Rounds<'_, M>,
+    found: Settled<M>,
+    rivals: &[Hypothesis],
+    held_out: &[usize],
+) -> Option<(Settled<M>, Judgement)> {
+    let mut found = rounds.steady(found);
+    loop {
+        let judgement = weigh(&found, rivals, rounds.records, held_out, rounds.observer)?;
+        let (point, effects) = (&judgement.all.point, &judgement.effects);
+        let place = refuted(&judgement.unseen_gains).or_else(|| {
+            let is_said = judgement.verdict != Verdict::Unexplained;
+            is_said.then(|| unsure(rounds.assumed.candidates(), point, effects))?
+        });
+        let smaller = place.and_then(|place| {
+            let smaller = ablation::without(&found.hypothesis.fit.point, place);
+            rounds.settled(Some(&found), &smaller)
+        });
+        match smaller {
+            Some(smaller) => found = smaller,
+            None => return Some((found, judgement)),
+        }
+    }
 }
 
-impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
-    /// The model at `start` under its own noises; in the beginning no model is `near`.
-    fn settled(&self, near: Option<&Settled<M>>, start: &Point) -> Option<Settled<M>> {
-        let (records, observer) = (self.records, self.observer);
-        let found = match near {
-            Some(near) => settled_from(self.assumed, near, start, records, observer),
-            None => settled(self.quiet, start, records, observer),
-        }?;
-        let selection = PenalisedLikelihood::of(&found.model, self.records, self.observer);
-        selection.tell(Step::Refitted, &found.hypothesis);
-        Some(found)
-    }
-
-    /// From `start` as long as an effect pays, then without what does not; and the rivals of the last round.
-    fn search(&self, start: Settled<M>, floor: f64) -> (Settled<M>, Vec<Hypothesis>) {
-        let kept = start.hypothesis.effects();
-        let mut current = start;
-        let mut others: Vec<Settled<M>> = Vec::new();
-        while current.hypothesis.effects().len() < MOST_EFFECTS && !self.observer.is_over() {
-            let mut tried: Vec<Settled<M>> = self
-                .proposals(&current, floor, &[])
-                .iter()
-                .filter_map(|point| {
-                    self.observer.tell(|| {
-                        let what = named(self.assumed.candidates(), point);
-                        Progress::Trying(format!("{what} under its own noises"))
-                    });
-                    self.settled(Some(&current), point)
-                })
-                .filter(|own| {
-                    let point = &own.hypothesis.fit.point;
-                    matters(self.assumed.candidates(), point, floor)
-                })
-                .collect();
-            tried.sort_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score));
-            let candidates = self.assumed.candidates();
-            let taken = tried
-                .iter()
-                .position(|own| pays(candidates, &own.hypothesis, &current.hypothesis));
-            let Some(taken) = taken else {
-                if others.is_empty() {
-                    others = tried;
-                }
-                break;
-            };
-            current = tried.remove(taken);
-            others = tried;
-        }
-        let mut others: Vec<Hypothesis> = others.into_iter().map(|own| own.hypothesis).collect();
-        let mut exchanges = 0..EXCHANGES;
-        loop {
-            let (best, simpler) =
-                ablated(self.assumed, current, &kept, self.records, self.observer);
-            let better = exchanges
-                .next()
-                .and_then(|_| self.exchanged(&best, &simpler, floor, &mut others));
-            match better {
-                Some(better) => current = better,
-                None => return (best, others),
-            }
-        }
-    }
-
-    /// A better model than `best` with another effect in the place of one of its own: what was taken first may have been
-    /// right only by itself. `simpler` are the models without each of these; what was tried in vain goes to `others`.
-    fn exchanged(
-        &self,
-        best: &Settled<M>,
-        simpler: &[Option<Settled<M>>],
-        floor: f64,
-        others: &mut Vec<Hypothesis>,
-    ) -> Option<Settled<M>> {
-        let mut known = vec![best.hypothesis.effects()];
-        known.extend(others.iter().map(Hypothesis::effects));
-        if known[0].len() < 2 {
-            return None;
-        }
-        for simpler in simpler.iter().flatten() {
-            if self
-                .extended
-                .borrow()
-                .contains(&simpler.hypothesis.effects())
-            {
-                continue;
-            }
-            for point in self.proposals(simpler, floor, &known) {
-                if self.observer.is_over() {
-                    break;
-                }
-                self.observer.tell(|| {
-                    let what = named(self.assumed.candidates(), &point);
-                    Progress::Trying(format!("{what} in its place"))
-                });
-                let Some(own) = self.settled(Some(simpler), &point) else {
-                    continue;
-                };
-                if own.hypothesis.score < best.hypothesis.score {
-                    others.push(best.hypothesis.clone());
-                    return Some(own);
-                }
-                known.push(own.hypothesis.effects());
-                others.push(own.hypothesis);
-            }
-        }
-        None
-    }
-
-    /// What is `found`, judged, without the effects that unseen records refute and without those that would be named
-    /// though they may not be there.
-    fn weighed(
-        &self,
-        found: Settled<M>,
-        rivals: &[Hypothesis],
-        held_out: &[usize],
-    ) -> Option<(Settled<M>, Judgement)> {
-        let mut found = self.steady(found);
-        loop {
-            let judgement = weigh(&found, rivals, self.records, held_out, self.observer)?;
-            let (point, effects) = (&judgement.all.point, &judgement.effects);
-            let place = refuted(&judgement.unseen_gains).or_else(|| {
-                let is_said = judgement.verdict != Verdict::Unexplained;
-                is_said.then(|| unsure(self.assumed.candidates(), point, effects))?
-            });
-            let smaller = place.and_then(|place| {
-                let smaller = ablation::without(&found.hypothesis.fit.point, place);
-                self.settled(Some(&found), &smaller)
-            });
-            match smaller {
-                Some(smaller) => found = smaller,
-                None => return Some((found, judgement)),
-            }
-        }
-    }
-
-    /// `found` without the effects of the linear part that hardly pay and depend on how closely the predictor
-    /// follows the records: the rig does not, a noise of another form does.
-    fn steady(&self, mut found: Settled<M>) -> Settled<M> {
-        while let Some(place) = self.wavering(&found) {
-            let smaller = ablation::without(&found.hypothesis.fit.point, place);
-            self.observer.tell(|| {
-                let what = named(self.assumed.candidates(), &smaller);
-                Progress::Trying(format!("only {what}"))
-            });
-            let (records, observer) = (self.records, self.observer);
-            let Some(smaller) = settled_from(self.assumed, &found, &smaller, records, observer)
-            else {
-                break;
-            };
-            if smaller.hypothesis.score - found.hypothesis.score > found.beyond_doubt() {
-                break;
-            }
-            found = smaller;
-        }
-        found
-    }
-
-    /// The place of an effect of the linear part in `found` that loses most of its size where the predictor
-    /// follows less closely.
-    fn wavering(&self, found: &Settled<M>) -> Option<usize> {
-        let candidates = found.model.candidates();
-        let effects = &found.hypothesis.fit.point.effects;
-        let mut linear = effects.iter().filter(|(i, _)| candidates[*i].is_linear);
-        if self.observer.is_over() || linear.next().is_none() {
-            return None;
-        }
-        let other = found.model.following_less()?;
-        let start = evaluate(&other, &found.hypothesis.fit.point, self.records)?;
-        let (again, _) = polish(&other, &start, self.records, None, ROUNDS_OF_DOUBT, SETTLED)?;
-        let mut pairs = effects.iter().zip(&again.point.effects);
-        pairs.position(|((i, own), (_, again))| {
-            let candidate = &candidates[*i];
-            candidate.is_linear && has_shrunk(candidate, own, again)
-        })
-    }
-
-    /// The one effect of `point` that explains most under the noises of the quiet records, which have no part
-    /// of what is missing.
-    fn core(&self, point: &Point) -> Option<WeighedModel> {
-        let selection = PenalisedLikelihood::of(self.quiet, self.records, self.observer);
-        let excess = |own: &Hypothesis| (own.mean_square() - 1.0).max(0.0);
-        let fitted = |effects: &[(usize, Vec<f64>)]| {
-            let start = Point {
-                nuisance: vec![0.0; point.nuisance.len()],
-                effects: effects.to_vec(),
-            };
-            selection.hypothesis(&evaluate(self.quiet, &start, self.records)?)
+/// The one effect of `point` that explains most under the noises of the quiet records, which have no part
+/// of what is missing.
+fn core<M: ExtensibleModel + Clone>(rounds: &Rounds<'_, M>, point: &Point) -> Option<WeighedModel> {
+    let selection = PenalisedLikelihood::of(rounds.quiet, rounds.records, rounds.observer);
+    let excess = |own: &Hypothesis| (own.mean_square() - 1.0).max(0.0);
+    let fitted = |effects: &[(usize, Vec<f64>)]| {
+        let start = Point {
+            nuisance: vec![0.0; point.nuisance.len()],
+            effects: effects.to_vec(),
         };
-        let nominal = excess(&fitted(&[])?);
-        let alone = point.effects.iter().filter_map(|own| {
-            let found = fitted(std::slice::from_ref(own))?;
-            let explains = 1.0 - excess(&found) / nominal.max(f64::MIN_POSITIVE);
-            Some(WeighedModel::of(self.quiet, &found, 0.0, explains, false))
-        });
-        alone.max_by(|a, b| a.explains.total_cmp(&b.explains))
-    }
-
-    /// Models with one more effect than `current` that are not `known`, the most promising first.
-    fn proposals(&self, current: &Settled<M>, floor: f64, known: &[Vec<usize>]) -> Vec<Point> {
-        let effects = current.hypothesis.effects();
-        self.extended.borrow_mut().push(effects);
-        let under = |model: &M, current: &Hypothesis| -> Vec<Point> {
-            let mut selection = PenalisedLikelihood::of(model, self.records, self.observer);
-            selection.floor = floor;
-            let mut level = selection.extensions(current);
-            let gains: Vec<f64> = level.iter().map(|own| current.score - own.score).collect();
-            let best = gains.first().copied().unwrap_or_default();
-            level.truncate(gains.iter().filter(|gain| **gain > NEAR * best).count());
-            let most = PROPOSED.saturating_sub(current.effects().len()).max(1);
-            let level = level.into_iter().map(|own| own.fit.point);
-            let new = level.filter(|point| !known.contains(&point.set()));
-            new.take(most).collect()
-        };
-        let mut all = Vec::new();
-        if !current.model.is_usual() || current.hypothesis.mean_square() > NEAR_NOISE {
-            let selection = PenalisedLikelihood::of(self.quiet, self.records, self.observer);
-            let start = evaluate(self.quiet, &current.hypothesis.fit.point, self.records);
-            if let Some(own) = start.and_then(|start| selection.hypothesis(&start)) {
-                all = under(self.quiet, &own);
-            }
-        }
-        if !all.is_empty() && !current.has_learned {
-            return all;
-        }
-        for point in under(&current.model, &current.hypothesis) {
-            if all.iter().all(|known| known.set() != point.set()) {
-                all.push(point);
-            }
-        }
-        all
-    }
+        selection.hypothesis(&evaluate(rounds.quiet, &start, rounds.records)?)
+    };
+    let nominal = excess(&fitted(&[])?);
+    let alone = point.effects.iter().filter_map(|own| {
+        let found = fitted(std::slice::from_ref(own))?;
+        let explains = 1.0 - excess(&found) / nominal.max(f64::MIN_POSITIVE);
+        Some(WeighedModel::of(rounds.quiet, &found, 0.0, explains, false))
+    });
+    alone.max_by(|a, b| a.explains.total_cmp(&b.explains))
 }
 
 /// The model with the noises that the `quiet` records show under the nominal one, where with them the residual
@@ -826,41 +609,6 @@ mod tests {
         let (effect, _, value, error, _) = figures[2];
         assert_eq!((effect, value), ("first", 2.5));
         assert!(error.is_nan());
-    }
-
-    #[test]
-    fn an_effect_has_shrunk_where_all_its_sizes_have() {
-        use crate::model::EffectParameter;
-        let parameter = |scale, role| EffectParameter {
-            name: "size",
-            unit: "N",
-            scale,
-            role,
-            bounds: (-10.0, 10.0),
-        };
-        let size = Role::Size { weak: 0.1 };
-        let shape = Role::Shape {
-            typical: 1.0,
-            spread: 0.5,
-        };
-        let two = [size, size, shape].map(|role| parameter(Scale::Linear(1.0), role));
-        let two = Candidate::new("two", two.to_vec(), Vec::new());
-        for (own, again, expected) in [
-            ([2.0, -4.0, 3.0], [0.9, -1.9, 3.0], true),
-            ([2.0, -4.0, 3.0], [1.1, -1.9, 0.0], false),
-            ([2.0, -4.0, 3.0], [0.9, -2.1, 3.0], false),
-            // Of another sign.
-            ([2.0, -4.0, 3.0], [-5.0, 5.0, 3.0], true),
-        ] {
-            assert_eq!(has_shrunk(&two, &own, &again), expected, "{again:?}");
-        }
-        // A logarithm says nothing of that, and a shape is no size.
-        let none = [
-            parameter(Scale::Logarithmic, size),
-            parameter(Scale::Linear(1.0), shape),
-        ];
-        let none = Candidate::new("none", none.to_vec(), Vec::new());
-        assert!(!has_shrunk(&none, &[2.0, 2.0], &[0.1, 0.1]));
     }
 
     #[test]
