@@ -87,7 +87,7 @@ pub(super) fn settled<M: ExtensibleModel + Clone>(
 }
 
 /// As [`settled`] under the noises of `near`, and under the `assumed` ones where those may hide what the model
-/// lacks: of both the better. A model that is far worse than `near` is no better known for that.
+/// lacks: of both the better. A model that is far worse than `near` needs no second look.
 pub(super) fn settled_from<M: ExtensibleModel + Clone>(
     assumed: &M,
     near: &Settled<M>,

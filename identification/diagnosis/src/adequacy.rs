@@ -32,7 +32,7 @@ const STATED_TOO_SURELY: f64 = 2.0;
 /// Correlation with state or command up to which it says nothing of the model: 1/1000 of the residual's power.
 const UNRELATED: f64 = 0.03;
 /// As [`UNRELATED`], beside effects of a larger tolerance that explain nearly all. The constant gain of the predictor is
-/// the worse the longer the table sticks: in two worlds the true law, its sizes right, left 0.10 and 0.21 in the record
+/// the worse the longer the table sticks. In two worlds the true law, its sizes right, left 0.10 and 0.21 in the record
 /// of low level (`judge_tables`, 8041 and 8030).
 const UNRELATED_AT_REST: f64 = 0.15;
 

@@ -19,8 +19,8 @@ pub const SUREST: f64 = 0.95;
 /// Standard deviations by which an effect predicts unseen records worse than the model without it, and goes.
 const REFUTED: f64 = 3.0;
 /// Standard errors by which a size of an effect that is named differs from zero at least. Of 73 effects that were named
-/// in worlds of another form, right ones differed by 7 and more but for one (3.6); of five named wrongly where no effect
-/// of the catalogue was, four differed by 2.8 to 4.6 (`judge_tables`, seeds 7000 and 8000).
+/// in worlds of another form, right ones differed by 7 and more but for one (3.6). Where no effect of the catalogue was,
+/// four of five wrong ones differed by 2.8 to 4.6 (`judge_tables`, seeds 7000 and 8000).
 const SURE: f64 = 5.0;
 /// Share of the excess error that a single effect explains to lead what is ranked.
 const MOST_OF_IT: f64 = 0.9;
