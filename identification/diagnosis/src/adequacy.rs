@@ -539,6 +539,18 @@ mod tests {
         is_explained: false,
     };
 
+    /// The tests of a record at rest.
+    fn looks(
+        residuals: &[f64],
+        channels: &[&str],
+        regressors: &[(String, Vec<f64>)],
+        drift: f64,
+    ) -> Vec<Test> {
+        tests(
+            "record", residuals, channels, regressors, drift, UNRELATED, &STILL,
+        )
+    }
+
     /// Normal values by the sum of twelve uniform ones.
     fn white(samples: usize) -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(11);
@@ -550,15 +562,7 @@ mod tests {
     fn white_noise_of_unit_variance_passes_every_test() {
         let noise = white(8192);
         let regressors = [("ramp".to_string(), (0..4096).map(f64::from).collect())];
-        let all = tests(
-            "record",
-            &noise,
-            &["one", "two"],
-            &regressors,
-            0.0,
-            UNRELATED,
-            &STILL,
-        );
+        let all = looks(&noise, &["one", "two"], &regressors, 0.0);
         // A mean square, a mean, bands and a regressor for each channel, and the parts of the record.
         assert!(all.len() > 60, "{}", all.len());
         for test in &all {
@@ -622,15 +626,7 @@ mod tests {
         let own: Vec<f64> = (0..n).map(|k| 5.0 + 0.1 * tone(k)).collect();
         let other = (0..n).map(|k| f64::from(u8::from(k % 2 == 0))).collect();
         let regressors = [("own".to_string(), own), ("other".to_string(), other)];
-        let all = tests(
-            "record",
-            &series,
-            &["one"],
-            &regressors,
-            0.0,
-            UNRELATED,
-            &STILL,
-        );
+        let all = looks(&series, &["one"], &regressors, 0.0);
         let of = |what: &str| {
             let own = all.iter().find(|test| test.what.starts_with(what));
             own.unwrap_or_else(|| panic!("no {what}"))
@@ -659,20 +655,12 @@ mod tests {
         let other = of("record: one against other").deviate;
         assert!((other + UNRELATED * energy.sqrt()).abs() < 1e-6, "{other}");
         // A level alone is a mean of that many samples.
-        let level = tests(
-            "record",
-            &vec![0.5; n],
-            &["one"],
-            &[],
-            0.0,
-            UNRELATED,
-            &STILL,
-        );
+        let level = looks(&vec![0.5; n], &["one"], &[], 0.0);
         assert!(
             (level[0].deviate - 0.5 * length.sqrt()).abs() < 1e-9,
             "{level:?}"
         );
-        assert!(tests("record", &[1.0; 63], &["one"], &[], 0.0, UNRELATED, &STILL).is_empty());
+        assert!(looks(&[1.0; 63], &["one"], &[], 0.0).is_empty());
     }
 
     #[test]
@@ -695,15 +683,7 @@ mod tests {
             let own = noise.chunks_exact_mut(2).enumerate();
             own.filter(|(i, _)| loud.contains(i))
                 .for_each(|(_, row)| row[1] *= 5.0);
-            let all = tests(
-                "record",
-                &noise,
-                &["one", "two"],
-                &[],
-                0.0,
-                UNRELATED,
-                &STILL,
-            );
+            let all = looks(&noise, &["one", "two"], &[], 0.0);
             all.iter()
                 .filter(|test| test.deviate > LARGEST_DEVIATE)
                 .count()
@@ -762,7 +742,7 @@ mod tests {
     fn noise_is_known_to_a_tenth() {
         let worst = |factor: f64| {
             let noise: Vec<f64> = white(40_000).iter().map(|value| factor * value).collect();
-            let all = tests("record", &noise, &["one"], &[], 0.0, UNRELATED, &STILL);
+            let all = looks(&noise, &["one"], &[], 0.0);
             all.iter().map(|test| test.deviate).fold(0.0, f64::max)
         };
         assert!(worst(1.1) < LARGEST_DEVIATE);
@@ -782,15 +762,7 @@ mod tests {
             }
             let signal = |k: usize| (std::f64::consts::TAU * turns * share(k)).sin();
             let regressors = [("signal".to_string(), (0..n).map(signal).collect())];
-            let all = tests(
-                "record",
-                &noise,
-                &["one"],
-                &regressors,
-                drift,
-                UNRELATED,
-                &STILL,
-            );
+            let all = looks(&noise, &["one"], &regressors, drift);
             let failed = all.iter().filter(|test| test.deviate > LARGEST_DEVIATE);
             failed.map(|test| test.what.clone()).collect::<Vec<_>>()
         };
@@ -825,7 +797,7 @@ mod tests {
         for (k, value) in noise.iter_mut().enumerate() {
             *value += 0.7 * (std::f64::consts::TAU * 0.1 * k as f64).sin();
         }
-        let all = tests("record", &noise, &["one"], &[], 0.0, UNRELATED, &STILL);
+        let all = looks(&noise, &["one"], &[], 0.0);
         let bands = all
             .iter()
             .filter(|test| test.what.contains("sampling rate"));

@@ -4,6 +4,7 @@ use super::adequacy::{LARGEST_DEVIATE, left_over};
 use super::fit::{Fit, Jacobian, evaluate, fit, polish, residuals};
 use super::model::{Candidate, ExtensibleModel, Point, Role, Scale};
 use super::progress::{Observer, Progress, Step};
+use std::cell::OnceCell;
 
 /// What an effect must earn, in units of `2 log` likelihood, before it is named. An effect that is
 /// not there earns χ² with one degree of freedom (Wilks, Ann. Math. Stat. 9, 1938), more than 18
@@ -322,15 +323,11 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
     }
 
     /// Extensions of an already good `parent`: only effects whose linear score promises to pay.
-    fn refine(&self, parent: &Hypothesis) -> Vec<Hypothesis> {
+    fn refine(&self, parent: &Hypothesis, exact: &Jacobian) -> Vec<Hypothesis> {
         let candidates = self.model.candidates();
         let Some(predictor) = self.model.predictor(&parent.fit.point) else {
             return Vec::new();
         };
-        // Derivatives that were carried along are too rough to tell an effect from the nominal parameter that it is
-        // nearly equal to.
-        let exact = Jacobian::at(self.model, &parent.fit, &self.records);
-        let exact = exact.as_ref().unwrap_or(&parent.jacobian);
         let Some(scorer) = exact.scorer(self.model, &parent.fit) else {
             return Vec::new();
         };
@@ -400,19 +397,6 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
         best
     }
 
-    /// Effects of `current` become more general ones that contain them, each from the best of its starts.
-    fn generalised(&self, current: &Hypothesis) -> Vec<Hypothesis> {
-        let Some(known) = Jacobian::at(self.model, &current.fit, &self.records) else {
-            return Vec::new();
-        };
-        let cases = general_cases(self.model.candidates(), &current.fit.point);
-        let fitted = cases.iter().filter_map(|(place, points)| {
-            let rest = known.without(current.fit.point.coordinates(*place));
-            self.best_of(points, &rest)
-        });
-        fitted.collect()
-    }
-
     /// The best of short fits to the first record from `points`, fitted to all: models whose last effect is new beside
     /// what has the derivatives `known`.
     fn best_of(&self, points: &[Point], known: &Jacobian) -> Option<Hypothesis> {
@@ -444,8 +428,17 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
 
     /// Models with one more effect than `current` that pay under the noises of this model, best first.
     pub fn extensions(&self, current: &Hypothesis) -> Vec<Hypothesis> {
+        // Derivatives that were carried along are too rough to tell an effect from the nominal parameter that it is
+        // nearly equal to.
+        let derivatives = OnceCell::new();
+        let exact = || {
+            derivatives.get_or_init(|| {
+                let exact = Jacobian::at(self.model, &current.fit, &self.records);
+                exact.unwrap_or_else(|| current.jacobian.clone())
+            })
+        };
         let mut level = if current.mean_square() < NEAR_NOISE {
-            self.refine(current)
+            self.refine(current, exact())
         } else if current.fit.point.effects.is_empty() {
             // A strong effect bends the nominal fit: begin at the nominal values themselves.
             self.extend(&[&self.origin()], 4)
@@ -454,8 +447,12 @@ impl<M: ExtensibleModel> PenalisedLikelihood<'_, M> {
         };
         let candidates = self.model.candidates();
         // What an effect has beyond its special case is asked for where that leaves traces.
-        if !current.fit.point.effects.is_empty() && self.leaves_traces(current) {
-            level.extend(self.generalised(current));
+        let general = general_cases(candidates, &current.fit.point);
+        if !general.is_empty() && self.leaves_traces(current) {
+            level.extend(general.iter().filter_map(|(place, points)| {
+                let rest = exact().without(current.fit.point.coordinates(*place));
+                self.best_of(points, &rest)
+            }));
             level.sort_by(|a, b| a.score.total_cmp(&b.score));
         }
         level.retain(|own| {

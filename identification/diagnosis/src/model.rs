@@ -197,6 +197,34 @@ pub struct EffectParameter {
     pub bounds: (f64, f64),
 }
 
+impl EffectParameter {
+    /// Whether it is a size that can be nothing: a logarithm has no zero.
+    pub(crate) fn has_zero(&self) -> bool {
+        matches!(self.role, Role::Size { .. }) && self.scale != Scale::Logarithmic
+    }
+
+    /// One of ten either way.
+    #[cfg(test)]
+    pub(crate) const fn example(scale: Scale, role: Role) -> Self {
+        Self {
+            name: "size",
+            unit: "N",
+            scale,
+            role,
+            bounds: (-10.0, 10.0),
+        }
+    }
+}
+
+#[cfg(test)]
+impl Role {
+    pub(crate) const SIZE: Self = Self::Size { weak: 0.1 };
+    pub(crate) const SHAPE: Self = Self::Shape {
+        typical: 1.0,
+        spread: 0.5,
+    };
+}
+
 /// One effect of the catalogue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {

@@ -5,7 +5,7 @@ use super::fit::{evaluate, polish};
 use super::likelihood::{
     Hypothesis, MOST_EFFECTS, NEAR_NOISE, PenalisedLikelihood, SETTLED, matters, named, pays,
 };
-use super::model::{Candidate, ExtensibleModel, Point, Role, Scale};
+use super::model::{Candidate, ExtensibleModel, Point};
 use super::progress::{Observer, Progress, Step};
 use std::cell::RefCell;
 
@@ -29,10 +29,21 @@ pub(super) struct Rounds<'a, M> {
     pub records: &'a [usize],
     pub observer: Observer<'a>,
     /// Sets of effects that were extended by further ones.
-    pub extended: RefCell<Vec<Vec<usize>>>,
+    extended: RefCell<Vec<Vec<usize>>>,
 }
 
-impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
+impl<'a, M: ExtensibleModel + Clone> Rounds<'a, M> {
+    /// On some `records`, from noises that were stated and from those of the quiet records.
+    pub fn of(assumed: &'a M, quiet: &'a M, records: &'a [usize], observer: Observer<'a>) -> Self {
+        Self {
+            assumed,
+            quiet,
+            records,
+            observer,
+            extended: RefCell::default(),
+        }
+    }
+
     /// The model at `start` under its own noises; in the beginning no model is `near`.
     pub fn settled(&self, near: Option<&Settled<M>>, start: &Point) -> Option<Settled<M>> {
         let (records, observer) = (self.records, self.observer);
@@ -220,9 +231,7 @@ impl<M: ExtensibleModel + Clone> Rounds<'_, M> {
 fn has_shrunk(candidate: &Candidate, own: &[f64], again: &[f64]) -> bool {
     let parameters = candidate.parameters.iter().zip(own).zip(again);
     let mut sizes = parameters
-        .filter(|((parameter, _), _)| {
-            matches!(parameter.role, Role::Size { .. }) && parameter.scale != Scale::Logarithmic
-        })
+        .filter(|((parameter, _), _)| parameter.has_zero())
         .map(|((_, own), again)| again * own.signum() < STEADY * own.abs())
         .peekable();
     sizes.peek().is_some() && sizes.all(|shrunk| shrunk)
@@ -231,23 +240,12 @@ fn has_shrunk(candidate: &Candidate, own: &[f64], again: &[f64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{EffectParameter, Role, Scale};
 
     #[test]
     fn an_effect_has_shrunk_where_all_its_sizes_have() {
-        use crate::model::EffectParameter;
-        let parameter = |scale, role| EffectParameter {
-            name: "size",
-            unit: "N",
-            scale,
-            role,
-            bounds: (-10.0, 10.0),
-        };
-        let size = Role::Size { weak: 0.1 };
-        let shape = Role::Shape {
-            typical: 1.0,
-            spread: 0.5,
-        };
-        let two = [size, size, shape].map(|role| parameter(Scale::Linear(1.0), role));
+        let linear = |role| EffectParameter::example(Scale::Linear(1.0), role);
+        let two = [Role::SIZE, Role::SIZE, Role::SHAPE].map(linear);
         let two = Candidate::new("two", two.to_vec(), Vec::new());
         for (own, again, expected) in [
             ([2.0, -4.0, 3.0], [0.9, -1.9, 3.0], true),
@@ -260,8 +258,8 @@ mod tests {
         }
         // A logarithm says nothing of that, and a shape is no size.
         let none = [
-            parameter(Scale::Logarithmic, size),
-            parameter(Scale::Linear(1.0), shape),
+            EffectParameter::example(Scale::Logarithmic, Role::SIZE),
+            linear(Role::SHAPE),
         ];
         let none = Candidate::new("none", none.to_vec(), Vec::new());
         assert!(!has_shrunk(&none, &[2.0, 2.0], &[0.1, 0.1]));

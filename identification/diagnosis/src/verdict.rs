@@ -7,11 +7,10 @@ use super::likelihood::{
     FLOOR, Hypothesis, NEAR_NOISE, NEARLY_NOISE, PenalisedLikelihood, RIVAL_WITHIN, ROUNDS,
     SETTLED, lacks, matters,
 };
-use super::model::{Candidate, ExtensibleModel, Point, Role, Scale};
+use super::model::{Candidate, ExtensibleModel, Point, Role};
 use super::progress::Observer;
 use super::rounds::Rounds;
 use serde::{Deserialize, Serialize};
-use std::cell::RefCell;
 
 /// No name is surer than hidden effects in worlds of another form have shown, of which too few were judged for
 /// more (docs/diagnosis.md). In those of the engine's own form 233 of 234 names were right.
@@ -223,13 +222,8 @@ pub fn judge<M: ExtensibleModel + Clone>(
     observer: Observer<'_>,
 ) -> Option<Judgement> {
     let at_rest = learned_at_rest(model, &model.quiet_records(fitted));
-    let rounds = Rounds {
-        assumed: &*model,
-        quiet: at_rest.as_ref().unwrap_or(&*model),
-        records: fitted,
-        observer,
-        extended: RefCell::default(),
-    };
+    let quiet = at_rest.as_ref().unwrap_or(&*model);
+    let rounds = Rounds::of(&*model, quiet, fitted, observer);
     let origin = Point {
         nuisance: vec![0.0; model.nuisance()],
         effects: Vec::new(),
@@ -289,9 +283,7 @@ fn unsure(candidates: &[Candidate], point: &Point, effects: &[NamedEffect]) -> O
     let surest = |(i, effect): (usize, &NamedEffect)| {
         let pairs = candidates[i].parameters.iter().zip(&effect.parameters);
         pairs
-            .filter(|(own, _)| {
-                matches!(own.role, Role::Size { .. }) && own.scale != Scale::Logarithmic
-            })
+            .filter(|(own, _)| own.has_zero())
             .map(|(_, size)| size.value.abs() / size.standard_error)
             .max_by(f64::total_cmp)
     };
@@ -542,6 +534,7 @@ fn weigh<M: ExtensibleModel>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{EffectParameter, Scale};
 
     #[test]
     fn a_size_is_known_no_better_than_its_model_explains() {
@@ -567,7 +560,6 @@ mod tests {
 
     #[test]
     fn estimates_are_in_si_with_the_errors_behind_those_of_the_nuisance() {
-        use crate::model::EffectParameter;
         let parameter = |name, scale, role| EffectParameter {
             name,
             unit: "N",
@@ -643,24 +635,11 @@ mod tests {
 
     #[test]
     fn an_effect_that_may_be_nothing_is_unsure() {
-        use crate::model::EffectParameter;
-        let parameter = |scale, role| EffectParameter {
-            name: "size",
-            unit: "N",
-            scale,
-            role,
-            bounds: (-10.0, 10.0),
-        };
-        let size = Role::Size { weak: 0.1 };
-        let shape = Role::Shape {
-            typical: 1.0,
-            spread: 0.5,
-        };
-        let linear = Scale::Linear(1.0);
+        let linear = |role| EffectParameter::example(Scale::Linear(1.0), role);
         let candidates = [
-            vec![parameter(linear, size), parameter(linear, shape)],
-            vec![parameter(linear, size), parameter(linear, size)],
-            vec![parameter(Scale::Logarithmic, size)],
+            vec![linear(Role::SIZE), linear(Role::SHAPE)],
+            vec![linear(Role::SIZE), linear(Role::SIZE)],
+            vec![EffectParameter::example(Scale::Logarithmic, Role::SIZE)],
         ]
         .map(|own| Candidate::new("effect", own, Vec::new()));
         let estimate = |(value, standard_error): (f64, f64)| ParameterEstimate {

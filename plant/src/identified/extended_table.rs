@@ -69,7 +69,7 @@ impl ExtendedTableState {
 }
 
 #[inline]
-pub(super) fn motion(s: &[f64; STATES]) -> TableMotion {
+fn motion(s: &[f64; STATES]) -> TableMotion {
     TableMotion {
         displacement: s[3],
         velocity: s[4],

@@ -404,6 +404,10 @@ impl Products {
         inputs: [f64; 2],
     ) {
         let places = &self.places[..self.count];
+        let motion = |[displacement, velocity]: [f64; 2]| TableMotion {
+            displacement,
+            velocity,
+        };
         for product in &self.of_piece {
             for _ in 0..product.times {
                 let mut own = [0.0; N];
@@ -411,26 +415,13 @@ impl Products {
                     *own = state.continuous[place % STATES];
                 }
                 let memory = &mut state.memory;
-                let resistance = |[displacement, velocity]: [f64; 2]| {
-                    let motion = TableMotion {
-                        displacement,
-                        velocity,
-                    };
-                    effects.resisting_force(&motion, memory)
-                };
+                let resistance = |at| effects.resisting_force(&motion(at), memory);
                 let next = product.advance(own, inputs, self.is_resisted.then_some(resistance));
                 for (own, place) in next.iter().zip(places) {
                     state.continuous[place % STATES] = *own;
                 }
                 if self.is_resisted {
-                    let [displacement, velocity] = [next[DISPLACEMENT], next[VELOCITY]];
-                    effects.remember(
-                        memory,
-                        &TableMotion {
-                            displacement,
-                            velocity,
-                        },
-                    );
+                    effects.remember(memory, &motion([next[DISPLACEMENT], next[VELOCITY]]));
                 }
             }
         }
