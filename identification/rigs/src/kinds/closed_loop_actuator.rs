@@ -384,6 +384,7 @@ impl Equations for ClosedLoopActuator {
         };
         let step = form.step(sample / steps, sample);
         let at = |place: f64| held * (scale * between(loop_input, place - delay) + offset);
+        let (share, per_length) = (1.0 / steps, 1.0 / step.length);
         let now = Cell::new(0.0);
         // What the flow is beyond that of the linear loop.
         let beyond = |sent: f64| {
@@ -391,14 +392,23 @@ impl Equations for ClosedLoopActuator {
                 let flow = gain * sent;
                 return flow.min(fastest).max(-fastest) - flow;
             }
-            let passed = inside.valve(now.get(), sent);
+            let passed = if inside.valves.is_empty() {
+                sent
+            } else {
+                inside.valve(now.get(), sent)
+            };
             let mut open = (passed.abs() - dead_band).max(0.0).copysign(passed);
             if null.reduction != 0.0 {
                 open -= null.reduction * null.width * tanh(passed / null.width);
             }
             let flow = gain * (open + asymmetry * open.abs());
             let flow = flow.min(fastest).max(-fastest);
-            flow / (1.0 + compression * flow.abs()) - gain * sent
+            let flow = if compression == 0.0 {
+                flow
+            } else {
+                flow / (1.0 + compression * flow.abs())
+            };
+            flow - gain * sent
         };
         let beyond = (has_effect || fastest < f64::INFINITY).then_some(&beyond);
         let start = scale * first + offset;
@@ -416,12 +426,12 @@ impl Equations for ClosedLoopActuator {
                 *y += coupling * (command[k] - clean[k]);
             }
             for part in 0..steps as usize {
-                let place = k as f64 + part as f64 / steps;
+                let place = k as f64 + part as f64 * share;
                 now.set(place * sample);
-                let end = at(place + 1.0 / steps);
+                let end = at(place + share);
                 let course = Course {
                     ends: [begin, end],
-                    slope: (end - begin) / step.length,
+                    slope: (end - begin) * per_length,
                 };
                 state = step.advance(state, &course, beyond);
                 begin = end;

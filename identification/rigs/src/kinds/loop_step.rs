@@ -20,19 +20,23 @@ pub(super) struct Loop {
 }
 
 /// Lagging command, displacement, flow, integral of the error, velocity and its rate times `P`, flow behind
-/// half of its lag; how far the bristles of friction are bent.
+/// half of its lag; friction of 1, against the speed: how far its bristles are bent.
 pub(super) type State = [f64; WIDTH];
 const STATES: usize = 7;
 const RATE: usize = 5;
 /// Its place in what the controller sends.
 const RATE_SENT: usize = 6;
-const BENT: usize = STATES;
+const RUBBED: usize = STATES;
 /// As processors take numbers.
 pub(super) const WIDTH: usize = 8;
-/// The states, the command, its slope, the flow beyond the linear one, its slope and the speed that friction
-/// takes.
+/// Behind the states: the command, its slope, the flow beyond the linear one, its rise over the step and the speed
+/// that friction takes.
+const COMMAND: usize = STATES;
+const SLOPE: usize = STATES + 1;
+const BEYOND: usize = STATES + 2;
+const RISE: usize = STATES + 3;
+const RUBS: usize = STATES + 4;
 const ALL: usize = STATES + 5;
-pub(super) const SLOPE: usize = STATES + 1;
 
 /// How friction builds up.
 #[derive(Debug, Clone, Copy)]
@@ -52,24 +56,13 @@ pub(super) struct Rubbing {
 }
 
 impl Rubbing {
-    /// What it takes at a `speed`, its bristles `bent`.
-    fn at(&self, speed: f64, bent: f64) -> f64 {
-        match self.law {
-            Law::Sliding(width) => -self.most * tanh(speed / width),
-            Law::Bristles(_) => -self.most * bent,
-        }
-    }
-
-    /// What it takes of a speed that is `now` and would be `free` after a step of `length` without it, and how far its
-    /// bristles, which were `bent`, are bent then, of 1. `share` is what one unit of it takes.
-    fn taken(&self, speeds: [f64; 2], share: f64, bent: f64, length: f64) -> (f64, f64) {
+    /// The friction of 1 after a step of `length` from the speed `now`, which would be `free` without it, and from a
+    /// friction of `before`. `share` is what one unit of it takes.
+    fn after(&self, [now, free]: [f64; 2], share: f64, before: f64, length: f64) -> f64 {
         let most = share * self.most;
         match self.law {
-            Law::Sliding(speed) => (rubbing(speeds, most, speed) / share, 0.0),
-            Law::Bristles(deflection) => {
-                let bent = bending(deflection, speeds, most, bent, length);
-                (-bent * self.most, bent)
-            }
+            Law::Sliding(speed) => rubbing([now, free], most, speed),
+            Law::Bristles(deflection) => bending(deflection, [now, free], most, before, length),
         }
     }
 }
@@ -84,24 +77,24 @@ fn bending(deflection: f64, [now, free]: [f64; 2], most: f64, bent: f64, length:
     let mut v = free - most * bent;
     for _ in 0..20 {
         let way = per_speed * (now + v);
-        let (a, side) = (way.abs(), way.signum());
-        let lacking = 1.0 - bent * side;
-        let decay = 1.0 / (1.0 + a * (1.0 + 0.5 * a));
-        let off = v + most * side * (1.0 - lacking * decay) - free;
+        let (a, side) = (way.abs(), 1.0_f64.copysign(way));
+        let lacking = most * (1.0 - bent * side);
+        // All times what the lack is divided by.
+        let decay = 1.0 + a * (1.0 + 0.5 * a);
+        let off = (v + most * side - free) * decay - lacking * side;
+        let step = off * decay / (decay * decay + lacking * (1.0 + a) * per_speed);
         if off > 0.0 {
             high = v;
         } else {
             low = v;
         }
-        let slope = lacking * (1.0 + a) * decay * decay * per_speed;
-        let step = off / (1.0 + most * slope);
         let next = v - step;
         v = if (low..=high).contains(&next) {
             next
         } else {
             0.5 * (low + high)
         };
-        if step.abs() <= 1e-6 * most {
+        if step.abs() <= SOLVED * most {
             break;
         }
     }
@@ -109,18 +102,19 @@ fn bending(deflection: f64, [now, free]: [f64; 2], most: f64, bent: f64, length:
     ((free - v) / most).clamp(-1.0, 1.0)
 }
 
-/// What friction takes, at `most`, of a speed that is `now` and would be `free` after a step without it: implicit, so
-/// that it sticks with steps of any length. Where the speed turns, friction does inside the step.
+/// The friction of 1 after a step from a speed that is `now` and would be `free` without what it takes, `most` at most:
+/// implicit, so that it sticks with steps of any length. Where the speed turns, friction does inside the step.
 fn rubbing([now, free]: [f64; 2], most: f64, sliding_speed: f64) -> f64 {
+    let (mut from, mut by) = (free, most);
     if now * (free - most.copysign(now)) < 0.0 {
         let end = free - most * tanh(now / sliding_speed);
         if now * end < 0.0 {
             // From rest in what is left of the step.
             let left = end / (end - now);
-            return slowed(left * (free - now), left * most, sliding_speed) - free;
+            (from, by) = (left * (free - now), left * most);
         }
     }
-    slowed(free, most, sliding_speed) - free
+    (free - slowed(from, by, sliding_speed)) / most
 }
 
 /// The speed after a step of friction `most` that would be `free` without.
@@ -146,13 +140,15 @@ fn slowed(free: f64, most: f64, sliding_speed: f64) -> f64 {
         } else {
             0.5 * (low + high)
         };
-        if step.abs() <= 1e-6 * sliding_speed {
+        if step.abs() <= SOLVED * sliding_speed {
             break;
         }
     }
     v.copysign(free)
 }
 
+/// Of what friction takes, or of its speed: the last step of Newton's method. The error is of the order of its square.
+const SOLVED: f64 = 1e-5;
 /// `tanh` is one beyond it.
 const SATURATED: f64 = 20.0;
 
@@ -170,12 +166,9 @@ pub(super) struct Step {
     pub(super) columns: [State; ALL],
     /// What the controller sends, of the first four states, the command, its slope and the velocity's rate.
     pub(super) sent: [f64; 7],
-    /// What it sends after the step of a flow beyond the linear one and of what friction takes.
-    pub(super) sent_of_beyond: f64,
-    pub(super) sent_of_rubbed: f64,
-    /// And of a slope of the flow beyond, where it feeds back.
-    sent_of_slope: f64,
-    /// And at once, of the velocity's rate.
+    /// What it sends of the states after the step, for one of everything before.
+    later: [f64; ALL],
+    /// What it sends at once for one of what friction takes, by the velocity's rate.
     sent_at_once: f64,
     /// Friction and the state that is the speed on which it acts.
     pub(super) rubbed: Option<(Rubbing, usize)>,
@@ -234,9 +227,7 @@ impl Loop {
         if has_resonance {
             sent[RATE_SENT] = -fed_back / gain;
         }
-        // Places of the command, its slope, the flow beyond, its slope and friction behind the states.
-        let [command, slope, beyond, its_slope, friction] = std::array::from_fn(|i| STATES + i);
-        let column = |i: usize| [0, 1, 2, 3, command, slope, RATE, beyond][i];
+        let column = |i: usize| [0, 1, 2, 3, COMMAND, SLOPE, RATE, BEYOND][i];
         let mut a = SMatrix::<f64, ALL, ALL>::zeros();
         let mut sent_at_once = 0.0;
         // The spring holds the table back behind whatever bounds what is sent.
@@ -271,25 +262,25 @@ impl Loop {
             a[(2, 6)] = pole;
             a[(2, 2)] = -pole;
             if !has_resonance {
-                a[(2, friction)] = pole;
+                a[(2, RUBS)] = pole;
             }
             a[(moved, 2)] += share;
         }
         if has_resonance {
             // On the mass: what it takes of a steady speed is lost in the damping (a leak, a coil's resistance).
             let per_friction = 0.5 / own_damping.max(LEAST_DAMPING);
-            a[(4, friction)] = share * per_friction;
+            a[(4, RUBS)] = share * per_friction;
             a[(1, 4)] = 1.0;
             a[(4, 5)] = share;
             a[(5, 4)] -= share;
             a[(5, 5)] -= 2.0 * own_damping * share;
             // The velocity's rate is less by what friction takes.
-            a[(driven, friction)] -= by * fed_back * per_friction;
+            a[(driven, RUBS)] -= by * fed_back * per_friction;
             sent_at_once = -fed_back * per_friction / gain;
         }
-        a[(command, slope)] = 1.0;
-        a[(beyond, its_slope)] = 1.0;
-        let a = a * length;
+        a[(COMMAND, SLOPE)] = 1.0;
+        let mut a = a * length;
+        a[(BEYOND, RISE)] = 1.0;
         let solution = if a.iter().all(|value| value.is_finite()) {
             a.exp()
         } else {
@@ -305,13 +296,7 @@ impl Loop {
                 std::array::from_fn(|i| if i < STATES { solution[(i, j)] } else { 0.0 })
             }),
             sent,
-            sent_of_beyond: sent_of(beyond),
-            sent_of_rubbed: sent_of(friction) + sent_at_once,
-            sent_of_slope: if sent[RATE_SENT] == 0.0 {
-                0.0
-            } else {
-                sent_of(its_slope)
-            },
+            later: std::array::from_fn(sent_of),
             sent_at_once,
             rubbed: self
                 .friction
@@ -329,45 +314,42 @@ impl Step {
         course: &Course,
         beyond: Option<&impl Fn(f64) -> f64>,
     ) -> State {
-        let [columns @ .., beyond_column, slope_column, rubbed] = &self.columns;
-        let rub = |own: &Rubbing, at: usize, free: f64| {
-            own.taken([state[at], free], rubbed[at], state[BENT], self.length)
-        };
+        let (columns, slope) = (&self.columns, course.slope);
+        let [begin, end] = course.ends;
         let mut after: State = [0.0; WIDTH];
-        for (j, column) in columns.iter().enumerate() {
-            let value = match j {
-                STATES => course.ends[0],
-                SLOPE => course.slope,
-                j => state[j],
-            };
-            add(&mut after, column, value);
+        for (column, value) in columns.iter().zip(&state[..STATES]) {
+            add(&mut after, column, *value);
         }
-        let sent = |state: &State, command: f64, slope: f64| -> f64 {
-            let own: f64 = (0..4).map(|i| self.sent[i] * state[i]).sum();
-            own + self.sent[4] * command + self.sent[5] * slope + self.sent[RATE_SENT] * state[RATE]
-        };
+        add(&mut after, &columns[COMMAND], begin);
+        add(&mut after, &columns[SLOPE], slope);
         if let Some(beyond) = beyond {
-            let [begin, end] = course.ends;
+            let (sent, later) = (&self.sent, &self.later);
+            // In pairs, which processors add side by side.
+            let pairs = |of: &[f64]| {
+                (of[0] * state[0] + of[1] * state[1]) + (of[2] * state[2] + of[3] * state[3])
+            };
+            let given = |command: f64| sent[4] * command + sent[5] * slope;
             let rubs = self.rubbed.as_ref();
-            let rubs = rubs.map_or(0.0, |(own, at)| own.at(state[*at], state[BENT]));
-            let now = beyond(sent(&state, begin, course.slope) + self.sent_at_once * rubs);
-            let mut sends = sent(&after, end, course.slope) + now * self.sent_of_beyond;
-            if let Some((own, at)) = &self.rubbed {
-                let free = after[*at] + now * beyond_column[*at];
-                sends += self.sent_of_rubbed * rub(own, *at, free).0;
+            let rubs = rubs.map_or(0.0, |(own, _)| -own.most * state[RUBBED]);
+            let rate = sent[RATE_SENT] * state[RATE] + self.sent_at_once * rubs;
+            let now = beyond((pairs(sent) + rate) + given(begin));
+            // What is sent feels little of how friction changes over the step.
+            let rate = later[4] * state[4] + later[RATE] * state[RATE];
+            let flow = later[6] * state[6] + (later[RUBS] + self.sent_at_once) * rubs;
+            let given = (later[COMMAND] * begin + later[SLOPE] * slope) + given(end);
+            let sends = (pairs(later) + (rate + flow)) + given + later[BEYOND] * now;
+            let mut rise = beyond(sends) - now;
+            if sent[RATE_SENT] != 0.0 {
+                rise = beyond(sends + later[RISE] * rise) - now;
             }
-            let mut its_slope = (beyond(sends) - now) / self.length;
-            if self.sent_of_slope != 0.0 {
-                let again = sends + its_slope * self.sent_of_slope;
-                its_slope = (beyond(again) - now) / self.length;
-            }
-            add(&mut after, beyond_column, now);
-            add(&mut after, slope_column, its_slope);
+            add(&mut after, &columns[BEYOND], now);
+            add(&mut after, &columns[RISE], rise);
         }
         if let Some((own, at)) = &self.rubbed {
-            let (taken, bent) = rub(own, *at, after[*at]);
-            add(&mut after, rubbed, taken);
-            after[BENT] = bent;
+            let (speeds, share) = ([state[*at], after[*at]], columns[RUBS][*at]);
+            let friction = own.after(speeds, share, state[RUBBED], self.length);
+            add(&mut after, &columns[RUBS], -own.most * friction);
+            after[RUBBED] = friction;
         }
         after
     }
