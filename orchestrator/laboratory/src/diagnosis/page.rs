@@ -13,7 +13,7 @@ use identification::diagnosis::{DiagnosisReport, Evidence, GainReport, ShakeTabl
 use super::case::Extended;
 use super::{DIAGNOSIS, pictures, rig, text};
 use pack::extended_model::ExtendedModel;
-use pages::report::number::significant;
+use pages::report::number::{estimated, significant};
 use pages::report::{
     Bar, BarGroup, Bars, Cell, Fact, Panel, Report, Section, Table, UnitSystem, identity,
 };
@@ -176,7 +176,7 @@ fn extended_rig(rig: &RigDiagnosis) -> Section {
             vec![
                 of.to_string(),
                 p.name.clone(),
-                significant(p.value, 5),
+                estimated(p.value, p.standard_error),
                 significant(p.standard_error, 2),
                 p.unit.clone(),
             ]
@@ -465,11 +465,12 @@ fn extended_case(case: &Case, model: &ExtendedModel) -> Section {
                 (significant(*before, 5), format!("{change:+.2} %"))
             });
             let error = estimate.standard_error;
+            let value = estimated(estimate.value, error.unwrap_or(f64::NAN));
             rows.push(vec![
                 (*component).to_string(),
                 name.clone(),
                 before,
-                significant(estimate.value, 5),
+                value,
                 error.map_or("-".into(), |error| significant(error, 2)),
                 change,
             ]);

@@ -10,6 +10,20 @@ pub fn significant(value: f64, digits: usize) -> String {
     rounded(value, digits, -5..=6)
 }
 
+/// `value` to the last of two digits of its standard `error`, and to five digits at most: beyond, it says nothing.
+pub fn estimated(value: f64, error: f64) -> String {
+    if !(error > 0.0 && error.is_finite() && value.is_finite()) {
+        return significant(value, 5);
+    }
+    let place = |size: f64| size.abs().log10().floor();
+    let digits = place(value) - place(error) + 2.0;
+    let unit = 10_f64.powf(place(error) - 1.0);
+    if digits < 1.0 {
+        return significant((value / unit).round() * unit, 1);
+    }
+    significant(value, digits.min(5.0) as usize)
+}
+
 /// The same for a page, with a minus sign, and a dash where there is no number.
 pub(super) fn typeset(value: f64, digits: usize) -> String {
     if !value.is_finite() {
@@ -38,7 +52,23 @@ fn rounded(value: f64, digits: usize, plain: RangeInclusive<i32>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{significant, typeset};
+    use super::{estimated, significant, typeset};
+
+    #[test]
+    fn an_estimate_has_the_digits_that_its_error_leaves() {
+        assert_eq!(estimated(12.3456, 0.21), "12.35");
+        assert_eq!(estimated(12.3456, 0.021), "12.346");
+        assert_eq!(estimated(12.3456, 0.000_021), "12.346");
+        assert_eq!(estimated(-0.000_859_4, 0.000_15), "-0.00086");
+        assert_eq!(estimated(4.3631e-10, 2.1e-8), "0");
+        assert_eq!(estimated(-4.3631e-10, 2.1e-8), "0");
+        assert_eq!(estimated(0.83, 12.0), "1");
+        assert_eq!(estimated(3.0, 120.0), "0");
+        assert_eq!(estimated(6.2, 120.0), "10");
+        assert_eq!(estimated(0.0, 0.1), "0");
+        assert_eq!(estimated(1.5, 0.0), "1.5000");
+        assert_eq!(estimated(1.5, f64::NAN), "1.5000");
+    }
 
     #[test]
     fn so_many_digits_and_no_more() {
