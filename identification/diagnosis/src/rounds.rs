@@ -62,21 +62,22 @@ impl<'a, M: ExtensibleModel + Clone> Rounds<'a, M> {
         let mut current = start;
         let mut others: Vec<Settled<M>> = Vec::new();
         while current.hypothesis.effects().len() < MOST_EFFECTS && !self.observer.is_over() {
-            let mut tried: Vec<Settled<M>> = self
-                .proposals(&current, floor, &[])
-                .iter()
-                .filter_map(|point| {
-                    self.observer.tell(|| {
-                        let what = named(self.assumed.candidates(), point);
-                        Progress::Trying(format!("{what} under its own noises"))
-                    });
-                    self.settled(Some(&current), point)
-                })
-                .filter(|own| {
-                    let point = &own.hypothesis.fit.point;
-                    matters(self.assumed.candidates(), point, floor)
-                })
-                .collect();
+            let mut tried: Vec<Settled<M>> = Vec::new();
+            for proposal in self.proposals(&current, floor, &[]) {
+                if proposal.is_reached(tried.iter().map(|own| &own.hypothesis).map(scored)) {
+                    continue;
+                }
+                let point = &proposal.point;
+                self.observer.tell(|| {
+                    let what = named(self.assumed.candidates(), point);
+                    Progress::Trying(format!("{what} under its own noises"))
+                });
+                tried.extend(self.settled(Some(&current), point));
+            }
+            tried.retain(|own| {
+                let point = &own.hypothesis.fit.point;
+                matters(self.assumed.candidates(), point, floor)
+            });
             tried.sort_by(|a, b| a.hypothesis.score.total_cmp(&b.hypothesis.score));
             let candidates = self.assumed.candidates();
             let taken = tried
@@ -128,15 +129,19 @@ impl<'a, M: ExtensibleModel + Clone> Rounds<'a, M> {
             {
                 continue;
             }
-            for point in self.proposals(simpler, floor, &known) {
+            for proposal in self.proposals(simpler, floor, &known) {
                 if self.observer.is_over() {
                     break;
                 }
+                if proposal.is_reached(others.iter().map(scored)) {
+                    continue;
+                }
+                let point = &proposal.point;
                 self.observer.tell(|| {
-                    let what = named(self.assumed.candidates(), &point);
+                    let what = named(self.assumed.candidates(), point);
                     Progress::Trying(format!("{what} in its place"))
                 });
-                let Some(own) = self.settled(Some(simpler), &point) else {
+                let Some(own) = self.settled(Some(simpler), point) else {
                     continue;
                 };
                 if own.hypothesis.score < best.hypothesis.score {
@@ -192,10 +197,11 @@ impl<'a, M: ExtensibleModel + Clone> Rounds<'a, M> {
     }
 
     /// Models with one more effect than `current` that are not `known`, the most promising first.
-    fn proposals(&self, current: &Settled<M>, floor: f64, known: &[Vec<usize>]) -> Vec<Point> {
+    /// Those under the noises of the quiet records come before those under its own, which may be of the same effects.
+    fn proposals(&self, current: &Settled<M>, floor: f64, known: &[Vec<usize>]) -> Vec<Proposal> {
         let effects = current.hypothesis.effects();
         self.extended.borrow_mut().push(effects);
-        let under = |model: &M, current: &Hypothesis| -> Vec<Point> {
+        let under = |model: &M, current: &Hypothesis| -> Vec<Proposal> {
             let mut selection = PenalisedLikelihood::of(model, self.records, self.observer);
             selection.floor = floor;
             let mut level = selection.extensions(current);
@@ -203,8 +209,11 @@ impl<'a, M: ExtensibleModel + Clone> Rounds<'a, M> {
             let best = gains.first().copied().unwrap_or_default();
             level.truncate(gains.iter().filter(|gain| **gain > NEAR * best).count());
             let most = PROPOSED.saturating_sub(current.effects().len()).max(1);
-            let level = level.into_iter().map(|own| own.fit.point);
-            let new = level.filter(|point| !known.contains(&point.set()));
+            let level = level.into_iter().map(|own| Proposal {
+                score: own.score,
+                point: own.fit.point,
+            });
+            let new = level.filter(|own| !known.contains(&own.point.set()));
             new.take(most).collect()
         };
         let mut all = Vec::new();
@@ -215,16 +224,37 @@ impl<'a, M: ExtensibleModel + Clone> Rounds<'a, M> {
                 all = under(self.quiet, &own);
             }
         }
+        // Scores under other noises say nothing here.
+        for own in &mut all {
+            own.score = f64::NEG_INFINITY;
+        }
         if !all.is_empty() && !current.has_learned {
             return all;
         }
-        for point in under(&current.model, &current.hypothesis) {
-            if all.iter().all(|known| known.set() != point.set()) {
-                all.push(point);
-            }
-        }
+        all.extend(under(&current.model, &current.hypothesis));
         all
     }
+}
+
+/// Effects with which a model is to be fitted under noises of its own.
+struct Proposal {
+    point: Point,
+    /// The score that it has, under the noises of the model that it extends.
+    score: f64,
+}
+
+impl Proposal {
+    /// Whether one of the models that were `fitted` has the same effects with no worse score: of two proposals of the same
+    /// effects the second one is needed only where the first led astray.
+    fn is_reached(&self, mut fitted: impl Iterator<Item = (Vec<usize>, f64)>) -> bool {
+        let set = self.point.set();
+        fitted.any(|(effects, score)| effects == set && score <= self.score)
+    }
+}
+
+/// The effects of a model and its score.
+fn scored(model: &Hypothesis) -> (Vec<usize>, f64) {
+    (model.effects(), model.score)
 }
 
 /// Whether an effect's sizes, at coordinates `own`, are less than half of that at `again`, or of another sign.
@@ -241,6 +271,27 @@ fn has_shrunk(candidate: &Candidate, own: &[f64], again: &[f64]) -> bool {
 mod tests {
     use super::*;
     use crate::model::{EffectParameter, Role, Scale};
+
+    #[test]
+    fn a_proposal_is_reached_by_a_model_of_its_effects_that_is_no_worse() {
+        let proposal = |score| Proposal {
+            point: Point {
+                nuisance: vec![0.0; 2],
+                effects: vec![(3, vec![1.0]), (1, vec![2.0])],
+            },
+            score,
+        };
+        let is_reached = |own: f64, effects: &[usize], score: f64| {
+            proposal(own).is_reached([(effects.to_vec(), score)].into_iter())
+        };
+        assert!(is_reached(40.0, &[1, 3], 37.0));
+        assert!(is_reached(40.0, &[1, 3], 40.0));
+        // It led astray.
+        assert!(!is_reached(40.0, &[1, 3], 46.0));
+        assert!(!is_reached(40.0, &[1], 3.0));
+        assert!(!is_reached(f64::NEG_INFINITY, &[1, 3], 3.0));
+        assert!(!proposal(40.0).is_reached(std::iter::empty()));
+    }
 
     #[test]
     fn an_effect_has_shrunk_where_all_its_sizes_have() {

@@ -101,6 +101,27 @@ impl Cause {
         is_early && lags.any(|p| p.value > 0.0)
     }
 
+    /// How much of it may be a lag that a fit of these `parameters` lost, each beside its stated value: a mass that rings
+    /// has oil under it, so that a valve moves it, and a valve lags.
+    pub(super) fn lost_lag(&self, parameters: &[(NamedValue, f64)]) -> f64 {
+        const RINGS: f64 = 0.45;
+        const LOST: f64 = 0.01;
+        let known = |name: &str| parameters.iter().find(|(own, _)| own.name == name);
+        let is_late = self.found.name == "command_delay" && self.found.value > self.stated;
+        let [lag, resonance, damping] = ["loop_lag", "resonance", "resonance_damping"].map(known);
+        match (lag, resonance, damping) {
+            (Some((lag, stated)), Some((resonance, _)), Some((damping, _)))
+                if is_late
+                    && lag.value < LOST * stated
+                    && resonance.value > 0.0
+                    && damping.value < RINGS =>
+            {
+                *stated
+            }
+            _ => 0.0,
+        }
+    }
+
     /// The cause in words, with value, unit and 95 % interval.
     pub fn words(&self) -> String {
         let NamedValue {
@@ -314,6 +335,26 @@ mod tests {
         );
         assert!(narrow < wide && wide < 0.5, "{narrow} {wide}");
         assert!(weight(4e-3, 0.5e-3) > 0.9);
+    }
+
+    #[test]
+    fn a_delay_beside_a_mass_that_rings_may_be_the_lag_of_its_valve() {
+        let lost = |name: &str, value: f64, lag: f64, damping: f64| {
+            let own = [
+                (found("loop_lag", lag, 1e-3, "s"), 4e-3),
+                (found("resonance", 6e-3, 1e-4, "s"), 5e-3),
+                (found("resonance_damping", damping, 0.01, "1"), 0.5),
+            ];
+            let found = found(name, value, 1e-3, "s");
+            Cause { found, stated: 0.0 }.lost_lag(&own)
+        };
+        assert_eq!(lost("command_delay", 4e-3, 0.0, 0.3), 4e-3);
+        assert_eq!(lost("command_delay", 4e-3, 1e-3, 0.3), 0.0);
+        assert_eq!(lost("command_delay", 4e-3, 0.0, 0.6), 0.0);
+        assert_eq!(lost("command_delay", -4e-3, 0.0, 0.3), 0.0);
+        assert_eq!(lost("offset", 4e-3, 0.0, 0.3), 0.0);
+        let found = found("command_delay", 4e-3, 1e-3, "s");
+        assert_eq!(Cause { found, stated: 0.0 }.lost_lag(&[]), 0.0);
     }
 
     #[test]

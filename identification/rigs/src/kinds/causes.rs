@@ -122,7 +122,13 @@ impl<'a, M: InParts> Asked<'a, M> {
         stated: f64,
     ) -> Option<Open> {
         let measured = self.measured;
-        let open = self.profiled(i)?.open(i, stated)?;
+        let beside = confirmed.parameters.iter().enumerate();
+        let beside = beside.map(|(i, own)| (own.clone(), measured.stated(i).0));
+        let lost = told.lost_lag(&beside.collect::<Vec<_>>());
+        let open = match self.profiled(i)?.open(i, stated)? {
+            Open::Within(low, high) => Open::Within(low - lost, high),
+            open => open,
+        };
         let own = &mut confirmed.parameters[i];
         let (low, high) = open.ends(own.value, stated);
         told.widen((low, high));

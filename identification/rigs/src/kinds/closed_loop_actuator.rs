@@ -102,7 +102,8 @@ effects! {
     /// they underlap): x' = K (e - s w tanh(e / w)) (Merritt 1967, section 5-2).
     reduced_null_gain: ReducedNullGain {
         reduction: size("1", 0.05, (-1.0, 1.0)),
-        width: shape("m", 0.1, 1.0),
+        // Wider, it is how the flow falls at speed.
+        width: shape("m", 0.1, 1.0).at_most(0.3),
     } from [[0.4, 0.1], [-0.3, 0.1]], like [vocabulary::DEAD_BAND, "friction", "bristle_friction"];
     /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
     /// of Hydraulic Servosystems, 1980).

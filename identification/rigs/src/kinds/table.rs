@@ -130,6 +130,12 @@ impl Entry {
     pub const fn off_at(self, value: f64) -> Self {
         Self { off: value, ..self }
     }
+
+    /// The same, `most` at most.
+    pub fn at_most(mut self, most: f64) -> Self {
+        self.bounds.1 = self.bounds.1.min(most);
+        self
+    }
 }
 
 /// A size counted in `weak`, the least worth a name; absent at zero.
