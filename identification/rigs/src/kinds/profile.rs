@@ -4,11 +4,11 @@ use rayon::prelude::*;
 
 use super::confirmed::{clearly_better, lengths};
 use super::parts::{EVERYTHING, InParts};
-use super::readings::{FAR, NEEDED};
+use super::readings::FAR;
 use diagnosis::{Point, all_errors, looked, settled, settled_along, squares};
 
-/// Growth of the squared error that tells nothing, as no model is exact: of what is not white noise; as much as an effect
-/// must bring ([`NEEDED`]) at least.
+/// Growth of the squared error that tells nothing: no model is exact; and as a share of what is not white noise.
+const INEXACT: f64 = 0.01;
 const COLOURED: f64 = 0.2;
 /// Values that are tried to either side.
 const TRIES: usize = 4;
@@ -66,7 +66,7 @@ pub(super) fn beside<'a, M: InParts>(measured: &'a M, point: &Point) -> Option<P
         measured,
         starts,
         best,
-        allowed: NEEDED.max(1.0 + COLOURED * coloured(&errors)),
+        allowed: 1.0 + INEXACT.max(COLOURED * coloured(&errors)),
         errors,
         lengths: lengths(measured, EVERYTHING),
     })
