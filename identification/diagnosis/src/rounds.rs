@@ -236,7 +236,7 @@ impl<'a, M: ExtensibleModel + Clone> Rounds<'a, M> {
     }
 }
 
-/// Effects with which a model is to be fitted under noises of its own.
+/// Effects that a model may have under noises of its own.
 struct Proposal {
     point: Point,
     /// The score that it has, under the noises of the model that it extends.

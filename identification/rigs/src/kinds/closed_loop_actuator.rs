@@ -509,6 +509,15 @@ mod tests {
     }
 
     #[test]
+    fn the_region_around_null_is_narrow() {
+        let mut effects = Effects::table().into_iter();
+        let null = effects.find(|own| own.candidate.effect == "reduced_null_gain");
+        let parameters = null.unwrap().candidate.parameters;
+        let bounds = parameters.iter().map(|own| own.bounds.1);
+        assert_eq!(bounds.collect::<Vec<_>>(), [1.0, 0.3]);
+    }
+
+    #[test]
     fn a_step_is_the_closed_form_at_any_rate() {
         // 1 / ((1 + τ s)(1 + s / K)) at 1 kHz and at 25 Hz, where K h = 2.
         let (gain, lag) = (50.0, 0.005);

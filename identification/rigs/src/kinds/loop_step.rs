@@ -322,6 +322,10 @@ impl Step {
         }
         add(&mut after, &columns[COMMAND], begin);
         add(&mut after, &columns[SLOPE], slope);
+        let rub = |own: &Rubbing, at: usize, free: f64| {
+            let (speeds, share) = ([state[at], free], columns[RUBS][at]);
+            own.after(speeds, share, state[RUBBED], self.length)
+        };
         if let Some(beyond) = beyond {
             let (sent, later) = (&self.sent, &self.later);
             // In pairs, which processors add side by side.
@@ -333,11 +337,15 @@ impl Step {
             let rubs = rubs.map_or(0.0, |(own, _)| -own.most * state[RUBBED]);
             let rate = sent[RATE_SENT] * state[RATE] + self.sent_at_once * rubs;
             let now = beyond((pairs(sent) + rate) + given(begin));
-            // What is sent feels little of how friction changes over the step.
             let rate = later[4] * state[4] + later[RATE] * state[RATE];
-            let flow = later[6] * state[6] + (later[RUBS] + self.sent_at_once) * rubs;
             let given = (later[COMMAND] * begin + later[SLOPE] * slope) + given(end);
-            let sends = (pairs(later) + (rate + flow)) + given + later[BEYOND] * now;
+            let mut sends =
+                (pairs(later) + (rate + later[6] * state[6])) + given + later[BEYOND] * now;
+            if let Some((own, at)) = &self.rubbed {
+                let free = after[*at] + now * columns[BEYOND][*at];
+                let rubs = -own.most * rub(own, *at, free);
+                sends += (later[RUBS] + self.sent_at_once) * rubs;
+            }
             let mut rise = beyond(sends) - now;
             if sent[RATE_SENT] != 0.0 {
                 rise = beyond(sends + later[RISE] * rise) - now;
@@ -346,8 +354,7 @@ impl Step {
             add(&mut after, &columns[RISE], rise);
         }
         if let Some((own, at)) = &self.rubbed {
-            let (speeds, share) = ([state[*at], after[*at]], columns[RUBS][*at]);
-            let friction = own.after(speeds, share, state[RUBBED], self.length);
+            let friction = rub(own, *at, after[*at]);
             add(&mut after, &columns[RUBS], -own.most * friction);
             after[RUBBED] = friction;
         }
