@@ -224,7 +224,7 @@ impl<'a, M: ExtensibleModel + Clone> Rounds<'a, M> {
                 all = under(self.quiet, &own);
             }
         }
-        // Scores under other noises say nothing here.
+        // Scores under the noises of the quiet records say nothing here.
         for own in &mut all {
             own.score = f64::NEG_INFINITY;
         }

@@ -101,25 +101,24 @@ impl Cause {
         is_early && lags.any(|p| p.value > 0.0)
     }
 
-    /// How much of it may be a lag that a fit of these `parameters` lost, each beside its stated value: a mass that rings
+    /// How much of it may be a lag that a fit of these `parameters` lost, which is `stated` by its place: a mass that rings
     /// has oil under it, so that a valve moves it, and a valve lags.
-    pub(super) fn lost_lag(&self, parameters: &[(NamedValue, f64)]) -> f64 {
+    pub(super) fn lost_lag(&self, parameters: &[NamedValue], stated: impl Fn(usize) -> f64) -> f64 {
         const RINGS: f64 = 0.45;
         const LOST: f64 = 0.01;
-        let known = |name: &str| parameters.iter().find(|(own, _)| own.name == name);
         let is_late = self.found.name == "command_delay" && self.found.value > self.stated;
-        let [lag, resonance, damping] = ["loop_lag", "resonance", "resonance_damping"].map(known);
-        match (lag, resonance, damping) {
-            (Some((lag, stated)), Some((resonance, _)), Some((damping, _)))
-                if is_late
-                    && lag.value < LOST * stated
-                    && resonance.value > 0.0
-                    && damping.value < RINGS =>
-            {
-                *stated
-            }
-            _ => 0.0,
+        let rings = |p: &NamedValue| match p.name.as_str() {
+            "resonance" => p.value > 0.0,
+            "resonance_damping" => p.value < RINGS,
+            _ => false,
+        };
+        if !is_late || parameters.iter().filter(|p| rings(p)).count() < 2 {
+            return 0.0;
         }
+        let lag = parameters.iter().position(|p| p.name == "loop_lag");
+        lag.map(|i| (parameters[i].value, stated(i)))
+            .filter(|(value, stated)| *value < LOST * stated)
+            .map_or(0.0, |(_, stated)| stated)
     }
 
     /// The cause in words, with value, unit and 95 % interval.
@@ -341,12 +340,12 @@ mod tests {
     fn a_delay_beside_a_mass_that_rings_may_be_the_lag_of_its_valve() {
         let lost = |name: &str, value: f64, lag: f64, damping: f64| {
             let own = [
-                (found("loop_lag", lag, 1e-3, "s"), 4e-3),
-                (found("resonance", 6e-3, 1e-4, "s"), 5e-3),
-                (found("resonance_damping", damping, 0.01, "1"), 0.5),
+                found("loop_lag", lag, 1e-3, "s"),
+                found("resonance", 6e-3, 1e-4, "s"),
+                found("resonance_damping", damping, 0.01, "1"),
             ];
             let found = found(name, value, 1e-3, "s");
-            Cause { found, stated: 0.0 }.lost_lag(&own)
+            Cause { found, stated: 0.0 }.lost_lag(&own, |i| [4e-3, 5e-3, 0.5][i])
         };
         assert_eq!(lost("command_delay", 4e-3, 0.0, 0.3), 4e-3);
         assert_eq!(lost("command_delay", 4e-3, 1e-3, 0.3), 0.0);
@@ -354,7 +353,7 @@ mod tests {
         assert_eq!(lost("command_delay", -4e-3, 0.0, 0.3), 0.0);
         assert_eq!(lost("offset", 4e-3, 0.0, 0.3), 0.0);
         let found = found("command_delay", 4e-3, 1e-3, "s");
-        assert_eq!(Cause { found, stated: 0.0 }.lost_lag(&[]), 0.0);
+        assert_eq!(Cause { found, stated: 0.0 }.lost_lag(&[], |_| 1.0), 0.0);
     }
 
     #[test]

@@ -122,9 +122,7 @@ impl<'a, M: InParts> Asked<'a, M> {
         stated: f64,
     ) -> Option<Open> {
         let measured = self.measured;
-        let beside = confirmed.parameters.iter().enumerate();
-        let beside = beside.map(|(i, own)| (own.clone(), measured.stated(i).0));
-        let lost = told.lost_lag(&beside.collect::<Vec<_>>());
+        let lost = told.lost_lag(&confirmed.parameters, |i| measured.stated(i).0);
         let open = match self.profiled(i)?.open(i, stated)? {
             Open::Within(low, high) => Open::Within(low - lost, high),
             open => open,

@@ -393,11 +393,7 @@ impl Equations for ClosedLoopActuator {
                 let flow = gain * sent;
                 return flow.min(fastest).max(-fastest) - flow;
             }
-            let passed = if inside.valves.is_empty() {
-                sent
-            } else {
-                inside.valve(now.get(), sent)
-            };
+            let passed = inside.valve(now.get(), sent);
             let mut open = (passed.abs() - dead_band).max(0.0).copysign(passed);
             if null.reduction != 0.0 {
                 open -= null.reduction * null.width * tanh(passed / null.width);

@@ -166,7 +166,7 @@ pub(super) struct Step {
     pub(super) columns: [State; ALL],
     /// What the controller sends, of the first four states, the command, its slope and the velocity's rate.
     pub(super) sent: [f64; 7],
-    /// What it sends of the states after the step, for one of everything before.
+    /// What it sends after the step for one of everything before, beside what it sends of the command there.
     later: [f64; ALL],
     /// What it sends at once for one of what friction takes, by the velocity's rate.
     sent_at_once: f64,
@@ -290,13 +290,15 @@ impl Loop {
             let first: f64 = (0..4).map(|i| sent[i] * solution[(i, j)]).sum();
             first + sent[RATE_SENT] * solution[(RATE, j)]
         };
+        let mut later: [f64; ALL] = std::array::from_fn(sent_of);
+        later[RUBS] += sent_at_once;
         Step {
             length,
             columns: std::array::from_fn(|j| {
                 std::array::from_fn(|i| if i < STATES { solution[(i, j)] } else { 0.0 })
             }),
             sent,
-            later: std::array::from_fn(sent_of),
+            later,
             sent_at_once,
             rubbed: self
                 .friction
@@ -343,8 +345,7 @@ impl Step {
                 (pairs(later) + (rate + later[6] * state[6])) + given + later[BEYOND] * now;
             if let Some((own, at)) = &self.rubbed {
                 let free = after[*at] + now * columns[BEYOND][*at];
-                let rubs = -own.most * rub(own, *at, free);
-                sends += (later[RUBS] + self.sent_at_once) * rubs;
+                sends += later[RUBS] * (-own.most * rub(own, *at, free));
             }
             let mut rise = beyond(sends) - now;
             if sent[RATE_SENT] != 0.0 {

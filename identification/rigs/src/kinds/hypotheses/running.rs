@@ -53,6 +53,7 @@ impl Inside<'_> {
     }
 
     /// What the valve gets of what the controller sends.
+    #[inline]
     pub fn valve(&self, time: f64, sent: f64) -> f64 {
         let valves = self.valves.iter();
         valves.fold(sent, |sent, own| own.passed(time, sent))
