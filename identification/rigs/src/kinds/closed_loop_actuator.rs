@@ -1,13 +1,14 @@
 //! Servo-hydraulic actuator in a closed displacement loop: command to displacement.
 //!
-//! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K`,
-//! `T/2 q' = K (c - y x) - q`, `T/2 w' = q - w`, `P² v'' + 2 d P v' + v = w`, `x' = v` (Merritt, Hydraulic Control Systems,
-//! 1967: a valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). A motor or a
-//! shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. A spring `y` under the table
-//! without an integral is a larger gain and a smaller scale: as `i` goes to 0, `K` and `g` are those of the table as it
-//! moves, so that `y` shows in what bounds the flow alone. Two lags in a row are nearer to a spool, and to a coil before
-//! a mass, than one and a delay. Between samples the command follows a curve, of which a step takes the chord. The
-//! linear equations are solved exactly, and what is not linear by steps.
+//! Nominal: `τ u' = g r(t - D) + o - u`, `e = u - x`, `z' = i e`, `c = e + z + f u' / K`, `T/2 q' = K c - q`,
+//! `T/2 w' = q - w`, `P² v'' + 2 d P v' + v = w - K y x`, `x' = v` (Merritt, Hydraulic Control Systems, 1967: a
+//! valve-controlled cylinder integrates, the table's mass swings on the oil, the loop closes). Without a resonance
+//! `T/2 v' = q - K y x - v`. What a valve passes is `w`, or that `q`: its effects act there, behind the spool, and a rail on
+//! `K c`. A motor or a shaker on a voltage amplifier in such a loop has the same form; its mass is part of `T`. A spring
+//! `y` under the table without an integral is a larger gain and a smaller scale: as `i` goes to 0, `K` and `g` are those
+//! of the table as it moves, so that `y` shows in what bounds the flow alone. Two lags in a row are nearer to a spool, and
+//! to a coil before a mass, than one and a delay. Between samples the command follows a curve, of which a step takes
+//! the chord. The linear equations are solved exactly, and what is not linear by steps.
 //!
 //! Effects are counted in natural units: the standard deviation of the displacement and `1/K`.
 
@@ -94,27 +95,27 @@ effects! {
         breakaway_error: size("m", 3e-3, (0.0, 3.0)),
         deflection: shape("m", 0.01, 0.5),
     } from [[0.01, 0.005], [0.05, 0.02]], like [vocabulary::DEAD_BAND, "reduced_null_gain", "friction", "free_play"];
-    /// Overlapped valve: x' = K (e - b sgn e) beyond |e| > b (Merritt 1967, section 5-2).
+    /// Overlapped valve: it passes w - K b sgn w beyond |w| > K b (Merritt 1967, section 5-2).
     dead_band: DeadBand {
         half_width: size("m", 3e-3, (0.0, 3.0)),
     } from [[0.02], [0.15]], like ["reduced_null_gain", "friction"];
     /// Lands that overlap and leak, so that the flow gain is lower around null (higher where
-    /// they underlap): x' = K (e - s w tanh(e / w)) (Merritt 1967, section 5-2).
+    /// they underlap): it passes w - s K b tanh(w / K b) with b the width (Merritt 1967, section 5-2).
     reduced_null_gain: ReducedNullGain {
         reduction: size("1", 0.05, (-1.0, 1.0)),
         // Wider, it is how the flow falls at speed.
         width: shape("m", 0.1, 1.0).at_most(0.3),
     } from [[0.4, 0.1], [-0.3, 0.1]], like [vocabulary::DEAD_BAND, "friction", "bristle_friction"];
-    /// Unequal piston areas: x' = K e (1 + a sgn e) (Viersma, Analysis, Synthesis and Design
+    /// Unequal piston areas: the flow is w (1 + a sgn w) (Viersma, Analysis, Synthesis and Design
     /// of Hydraulic Servosystems, 1980).
     asymmetric_gain: AsymmetricGain {
         asymmetry: size("1", 0.01, (-0.8, 0.8)),
     } from [[0.03], [-0.03]];
-    /// Spool: T/2 q' = K e - q, T/2 w' = q - w, x' = w.
+    /// Spool: T/2 q' = K c - q, T/2 w' = q - w.
     valve_lag: ValveLag {
         time_constant: size("s", 0.05, (0.0, 1.0)),
     } from [[0.1], [0.3]], like ["delay"];
-    /// Flow falls with speed as the load pressure rises: x' = w / (1 + |w| / s).
+    /// Flow falls with speed as the load pressure rises: w / (1 + s |w|).
     flow_saturation: FlowSaturation {
         compression: size("s/m", 0.01, (0.0, 5.0)),
     } from [[0.05]], like ["speed_limit"];
@@ -370,8 +371,10 @@ impl Equations for ClosedLoopActuator {
         };
         let has_effect =
             dead_band != 0.0 || null.reduction != 0.0 || asymmetry != 0.0 || compression != 0.0;
-        let has_effect = has_effect || !inside.valves.is_empty();
-        let is_linear = !has_effect && fastest == f64::INFINITY && form.friction.is_none();
+        let is_linear = !has_effect
+            && inside.valves.is_empty()
+            && fastest == f64::INFINITY
+            && form.friction.is_none();
         let steps = if is_linear {
             SMOOTH
         } else {
@@ -387,30 +390,52 @@ impl Equations for ClosedLoopActuator {
         let at = |place: f64| held * (scale * between(loop_input, place - delay) + offset);
         let (share, per_length) = (1.0 / steps, 1.0 / step.length);
         let now = Cell::new(0.0);
-        // What the flow is beyond that of the linear loop.
-        let beyond = |sent: f64| {
-            if !has_effect {
-                let flow = gain * sent;
-                return flow.min(fastest).max(-fastest) - flow;
-            }
-            let passed = inside.valve(now.get(), sent);
+        // The flow through the valve where the spool would give this one.
+        let through = |linear: f64| {
+            let passed = linear / gain;
             let mut open = (passed.abs() - dead_band).max(0.0).copysign(passed);
             if null.reduction != 0.0 {
                 open -= null.reduction * null.width * tanh(passed / null.width);
             }
             let flow = gain * (open + asymmetry * open.abs());
-            let flow = flow.min(fastest).max(-fastest);
-            let flow = if compression == 0.0 {
+            if compression == 0.0 {
                 flow
             } else {
                 flow / (1.0 + compression * flow.abs())
+            }
+        };
+        let is_bounded = fastest < f64::INFINITY || !inside.valves.is_empty();
+        let asked = |sent: f64| {
+            let flow = gain * inside.valve(now.get(), sent);
+            flow.min(fastest).max(-fastest)
+        };
+        // What either is beyond that of the linear loop.
+        let has_spool = has_effect.then_some(step.spool).flatten();
+        let beyond = |sent: f64| {
+            let flow = asked(sent);
+            let flow = if has_effect && has_spool.is_none() {
+                through(flow)
+            } else {
+                flow
             };
             flow - gain * sent
         };
-        let beyond = (has_effect || fastest < f64::INFINITY).then_some(&beyond);
+        let beyond = (is_bounded || has_effect && has_spool.is_none()).then_some(&beyond);
+        let passed = |spool: f64| through(spool) - spool;
+        let passed = has_spool.map(|at| (at, &passed));
         let start = scale * first + offset;
         let made_up = spring_droop * (1.0 - idle) * start;
-        let mut state: State = [held * start, start, 0.0, made_up, 0.0, 0.0, 0.0, 0.0];
+        let against = gain * spring_droop * start;
+        let mut state: State = [
+            held * start,
+            start,
+            against,
+            made_up,
+            0.0,
+            0.0,
+            against,
+            0.0,
+        ];
         let mut shown = state[1];
         let mut begin = at(0.0);
         for (k, y) in out.iter_mut().enumerate() {
@@ -430,7 +455,7 @@ impl Equations for ClosedLoopActuator {
                     ends: [begin, end],
                     slope: (end - begin) * per_length,
                 };
-                state = step.advance(state, &course, beyond);
+                state = step.advance(state, &course, beyond, passed);
                 begin = end;
             }
         }
@@ -810,6 +835,66 @@ mod tests {
             assert!(off(fed_back, never, held) < 1e-4);
             assert!(off(fed_back, often, held) < 1e-3);
             assert!(off(0.0, often, held) > 2e-3);
+        }
+    }
+
+    #[test]
+    fn what_a_valve_passes_is_behind_its_spool_and_a_spring_behind_the_valve() {
+        // The equations as they stand, by small steps of their own.
+        let (gain, lag, resonance, damping, droop) = (30.0, 0.012, 0.008, 0.3, 0.04);
+        let (dead_band, asymmetry) = (3e-4, 0.15);
+        let (rate, n, steps) = (200.0, 2000, 400);
+        let wave = |t: f64| 0.01 * (3.0 * t).sin() + 2e-3 * (31.0 * t).sin();
+        let command: Vec<f64> = (0..n).map(|k| wave(k as f64 / rate)).collect();
+        let integral = 8.0;
+        let measured = |resonance: f64| {
+            let (mut z, mut q, mut w, mut v, mut bend, mut x) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+            let h = 1.0 / rate / f64::from(steps);
+            let through = |flow: f64| {
+                let beyond: f64 = flow - flow.clamp(-gain * dead_band, gain * dead_band);
+                beyond * (1.0 + asymmetry * beyond.signum())
+            };
+            let mut measured = Vec::new();
+            for k in 0..n {
+                measured.push(x);
+                for part in 0..steps {
+                    let error = wave(k as f64 / rate + f64::from(part) * h) - x;
+                    z += h * integral * error;
+                    let spring = gain * droop * x;
+                    let half = 2.0 / lag;
+                    if resonance > 0.0 {
+                        w += h * half * (q - w);
+                        let moved = through(w) - spring;
+                        bend += h * (moved - v - 2.0 * damping * bend) / resonance;
+                        v += h * bend / resonance;
+                    } else {
+                        v += h * half * (through(q) - spring - v);
+                    }
+                    q += h * half * (gain * (error + z) - q);
+                    x += h * v;
+                }
+            }
+            measured
+        };
+        for resonance in [0.0, resonance] {
+            let nominal = Nominal {
+                integral,
+                loop_lag: lag,
+                spring_droop: droop,
+                resonance,
+                resonance_damping: damping,
+                ..proportional(gain)
+            };
+            let effects = Effects {
+                dead_band: DeadBand {
+                    half_width: dead_band,
+                },
+                asymmetric_gain: AsymmetricGain { asymmetry },
+                ..Effects::off().unwrap()
+            };
+            let out = answer(rate, &command, &nominal, &effects);
+            let off = relative_error(&out, &measured(resonance));
+            assert!(off < 2e-3, "{resonance}: {off}");
         }
     }
 

@@ -332,16 +332,22 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let standing = Standing { holds, explains };
     let found = causes(measured, &mut confirmed, &crossed, standing, observer);
     weighed.extend(found.weighed);
-    let mut causes = found.named;
+    let (mut causes, mut suspected) = (found.named, found.suspected);
     // Of records that no model explains, sensors tell less too.
     let tells = holds || explains || leaves_little;
     let (clear, unclear): (Vec<Cause>, Vec<Cause>) = measured
         .contradictions()
         .into_iter()
         .filter(|cause| tells || cause.deviations() > FAR)
+        .filter(|cause| causes.iter().all(|own| own.found.name != cause.found.name))
         .partition(Cause::is_clear);
+    // Sensors tell it better than a model in which others make up for it.
+    suspected.retain(|own| {
+        let mut all = clear.iter().chain(&unclear);
+        all.all(|told| told.found.name != own.found.name)
+    });
     causes.extend(clear);
-    let suspected = [unclear, found.suspected].concat();
+    suspected.splice(0..0, unclear);
     let leaves_nothing = confirmed.leaves_nothing();
     let is_answered = !confirmed.effects.is_empty() || !causes.is_empty() || leaves_nothing;
     // What was found and is not named is ranked.

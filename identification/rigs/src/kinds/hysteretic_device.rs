@@ -11,8 +11,9 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use realfft::RealFftPlanner;
 
 use super::between::between;
+use super::loose::zero_in_the_gap;
 use super::table::{effects, nominal_parameters, session_parameters, shape, size};
-use super::{Equations, Natural, RigRecording};
+use super::{Cause, Equations, Natural, RigRecording};
 use recordings::{Channel, mean_and_deviation};
 
 /// The rig.
@@ -322,6 +323,12 @@ impl Equations for HystereticDevice {
         let found = ringing(displacement, errors, recording.period());
         let start = found.map(|omega| ("load_path_resonance", vec![omega, 0.1]));
         start.into_iter().collect()
+    }
+
+    fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {
+        let zero = zero_in_the_gap(recordings, Channel::Displacement);
+        let cause = zero.and_then(|found| Cause::perhaps(found, (0.0, 0.0)));
+        cause.into_iter().collect()
     }
 }
 

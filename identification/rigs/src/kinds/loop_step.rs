@@ -29,14 +29,16 @@ const RATE_SENT: usize = 6;
 const RUBBED: usize = STATES;
 /// As processors take numbers.
 pub(super) const WIDTH: usize = 8;
-/// Behind the states: the command, its slope, the flow beyond the linear one, its rise over the step and the speed
-/// that friction takes.
+/// Behind the states: the command, its slope, the flow beyond the linear one that is asked for, its rise over the step,
+/// the speed that friction takes, and the flow beyond the linear one at the spool and its rise.
 const COMMAND: usize = STATES;
 const SLOPE: usize = STATES + 1;
 const BEYOND: usize = STATES + 2;
 const RISE: usize = STATES + 3;
 const RUBS: usize = STATES + 4;
-const ALL: usize = STATES + 5;
+const PASSED: usize = STATES + 5;
+const PASSED_RISE: usize = STATES + 6;
+const ALL: usize = STATES + 7;
 
 /// How friction builds up.
 #[derive(Debug, Clone, Copy)]
@@ -170,6 +172,8 @@ pub(super) struct Step {
     later: [f64; ALL],
     /// What it sends at once for one of what friction takes, by the velocity's rate.
     sent_at_once: f64,
+    /// The state that is the spool's position as a flow; none without a lag.
+    pub(super) spool: Option<usize>,
     /// Friction and the state that is the speed on which it acts.
     pub(super) rubbed: Option<(Rubbing, usize)>,
 }
@@ -230,10 +234,7 @@ impl Loop {
         let column = |i: usize| [0, 1, 2, 3, COMMAND, SLOPE, RATE, BEYOND][i];
         let mut a = SMatrix::<f64, ALL, ALL>::zeros();
         let mut sent_at_once = 0.0;
-        // The spring holds the table back behind whatever bounds what is sent.
-        let mut moves = sent;
-        moves[1] -= self.spring_droop;
-        let flow: [f64; 8] = std::array::from_fn(|i| moves.get(i).map_or(1.0, |s| gain * s));
+        let flow: [f64; 8] = std::array::from_fn(|i| sent.get(i).map_or(1.0, |s| gain * s));
         // What the flow moves: the table itself, or the mass on the oil.
         let moved = if has_resonance { RATE } else { 1 };
         let share = if has_resonance {
@@ -257,15 +258,22 @@ impl Loop {
         for (i, value) in flow.into_iter().enumerate() {
             a[(driven, column(i))] += by * value;
         }
+        // Behind the spool: the mass on the oil, or half of the lag in its place.
+        let mut passes = (moved, share);
         if pole > 0.0 {
             a[(6, 6)] -= pole;
             a[(2, 6)] = pole;
             a[(2, 2)] = -pole;
+            a[(moved, 2)] += share;
             if !has_resonance {
                 a[(2, RUBS)] = pole;
+                passes = (2, pole);
             }
-            a[(moved, 2)] += share;
         }
+        let (behind, by_spool) = passes;
+        a[(behind, PASSED)] = by_spool;
+        // The spring holds the table back behind whatever bounds the flow.
+        a[(behind, 1)] -= by_spool * gain * self.spring_droop;
         if has_resonance {
             // On the mass: what it takes of a steady speed is lost in the damping (a leak, a coil's resistance).
             let per_friction = 0.5 / own_damping.max(LEAST_DAMPING);
@@ -281,6 +289,7 @@ impl Loop {
         a[(COMMAND, SLOPE)] = 1.0;
         let mut a = a * length;
         a[(BEYOND, RISE)] = 1.0;
+        a[(PASSED, PASSED_RISE)] = 1.0;
         let solution = if a.iter().all(|value| value.is_finite()) {
             a.exp()
         } else {
@@ -300,6 +309,7 @@ impl Loop {
             sent,
             later,
             sent_at_once,
+            spool: (pole > 0.0).then_some(if has_resonance { 2 } else { 6 }),
             rubbed: self
                 .friction
                 .map(|own| (own, if has_resonance { 4 } else { 2 })),
@@ -308,13 +318,15 @@ impl Loop {
 }
 
 impl Step {
-    /// The state after the step. `beyond` is the flow beyond the linear one for what the controller sends.
+    /// The state after the step. `beyond` is the flow beyond the linear one for what the controller sends, `passed` for
+    /// the spool's position as a flow.
     #[inline]
     pub(super) fn advance(
         &self,
         state: State,
         course: &Course,
         beyond: Option<&impl Fn(f64) -> f64>,
+        passed: Option<(usize, &impl Fn(f64) -> f64)>,
     ) -> State {
         let (columns, slope) = (&self.columns, course.slope);
         let [begin, end] = course.ends;
@@ -328,6 +340,10 @@ impl Step {
             let (speeds, share) = ([state[at], free], columns[RUBS][at]);
             own.after(speeds, share, state[RUBBED], self.length)
         };
+        let passed = passed.map(|(at, passed)| (at, passed, passed(state[at])));
+        if let Some((.., now)) = passed {
+            add(&mut after, &columns[PASSED], now);
+        }
         if let Some(beyond) = beyond {
             let (sent, later) = (&self.sent, &self.later);
             // In pairs, which processors add side by side.
@@ -343,6 +359,9 @@ impl Step {
             let given = (later[COMMAND] * begin + later[SLOPE] * slope) + given(end);
             let mut sends =
                 (pairs(later) + (rate + later[6] * state[6])) + given + later[BEYOND] * now;
+            if let Some((.., now)) = passed {
+                sends += later[PASSED] * now;
+            }
             if let Some((own, at)) = &self.rubbed {
                 let free = after[*at] + now * columns[BEYOND][*at];
                 sends += later[RUBS] * (-own.most * rub(own, *at, free));
@@ -353,6 +372,10 @@ impl Step {
             }
             add(&mut after, &columns[BEYOND], now);
             add(&mut after, &columns[RISE], rise);
+        }
+        if let Some((at, passed, now)) = passed {
+            let rise = passed(after[at]) - now;
+            add(&mut after, &columns[PASSED_RISE], rise);
         }
         if let Some((own, at)) = &self.rubbed {
             let friction = rub(own, *at, after[*at]);
@@ -394,7 +417,12 @@ mod tests {
         let beyond: Option<&fn(f64) -> f64> = None;
         let advance = |state: State, share: f64, ends: [f64; 2]| {
             let step = form.step(share * length, length);
-            step.advance(state, &Course { ends, slope }, beyond)
+            step.advance(
+                state,
+                &Course { ends, slope },
+                beyond,
+                beyond.map(|own| (2, own)),
+            )
         };
         let halfway = advance(state, share, [1.0, middle]);
         let expected = advance(halfway, 1.0 - share, [middle, end]);

@@ -623,7 +623,17 @@ impl InParts for Measured<'_> {
     }
 
     fn contradictions(&self) -> Vec<Cause> {
-        self.rig.contradictions(&self.measurement.recordings)
+        let parameters = self.rig.parameters();
+        let place = |name: &str| parameters.iter().position(|(own, _)| *own == name);
+        let causes = self.rig.contradictions(&self.measurement.recordings);
+        // Of a nominal parameter it is what was stated that they contradict.
+        let causes = causes
+            .into_iter()
+            .filter_map(|cause| match place(&cause.found.name) {
+                Some(i) => Cause::perhaps(cause.found, self.nominal[i]),
+                None => Some(cause),
+            });
+        causes.collect()
     }
 }
 

@@ -29,6 +29,7 @@ mod hysteretic_device;
 mod linear_axis;
 mod linear_loop;
 mod loop_step;
+mod loose;
 mod measured;
 mod named_value;
 mod natural;
