@@ -10,7 +10,7 @@ use super::alternatives::{
 use super::cause::Cause;
 use super::causes::{FAR, Standing, causes};
 use super::confirmed::{
-    Confirmed, NominalFits, Refused, TOO_SMALL, agrees, confirm, is_vital, unfit,
+    Confirmed, NEAR, NominalFits, Refused, TOO_SMALL, agrees, confirm, is_vital, unfit,
 };
 use super::measured::Measured;
 use super::named_value::NamedValue;
@@ -27,6 +27,12 @@ use diagnosis::{
 const MOST: f64 = 0.5;
 /// Why an effect is not named that the data do not need for sure.
 const DOUBTED: &str = "the prediction of either part is hardly worse without it";
+/// Why an effect is not named where what one part finds predicts the data far better.
+const BEHIND: &str = "models of other effects predict either part far better";
+/// Squared error of a prediction over that of what one part alone found from which on it is far worse, and logarithm of
+/// how much likelier a model must be to be believed against it.
+const WORSE: f64 = 4.0;
+const LIKELIER: f64 = 3.0;
 /// Error on all data over that of a model with more nominal parameters, up to which it does as well.
 const AS_WELL: f64 = 1.02;
 /// Error of a model, over the output, that leaves nothing to doubt in how the output is measured.
@@ -284,6 +290,27 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
             (confirmed, crossed, refused, findings) = (without, errors, reasons, own);
         }
     }
+    // What is written may be far worse than what one part found alone.
+    let proposed = [&start.point, &as_described.point, &swapped.point];
+    let is_behind = |own: f64, alone: &PartReport| {
+        own > NEAR && own.powi(2) > WORSE * alone.extended_error.powi(2)
+    };
+    let mut found_alone = None;
+    if is_behind(confirmed.error, &as_described) || is_behind(confirmed.swapped_error, &swapped) {
+        let mut others = unnamed(measured, proposed, observer);
+        let is_far = |own: &Weighed| own.crossed.likelier_than(&crossed) > LIKELIER;
+        if others.iter().any(is_far) {
+            weighed.extend(Weighed::of(measured, &confirmed.point, crossed));
+            let mut bare = confirmed.point.clone();
+            let gone = bare.effects.drain(..);
+            refused.extend(gone.map(|(i, _)| (i, BEHIND.to_owned())));
+            findings.clear();
+            confirmed = confirm(measured, &nominal, &bare, &mut refused, &mut findings)?;
+            crossed = Crossed::of(measured, &confirmed.point)?;
+            weighed.append(&mut others);
+        }
+        found_alone = Some(others);
+    }
     for (i, reason) in refused {
         let effect = measured.name(i);
         if set_aside.iter().all(|known| known.effect != effect) {
@@ -332,28 +359,25 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let standing = Standing { holds, explains };
     let found = causes(measured, &mut confirmed, &crossed, standing, observer);
     weighed.extend(found.weighed);
-    let (mut causes, mut suspected) = (found.named, found.suspected);
+    // What sensors tell alone they tell better than a model in which others make up for it.
+    let is_open = |own: &Cause| !measured.is_read(&own.found.name);
+    let [mut causes, mut suspected] = [found.named, found.suspected]
+        .map(|all| all.into_iter().filter(is_open).collect::<Vec<Cause>>());
     // Of records that no model explains, sensors tell less too.
     let tells = holds || explains || leaves_little;
     let (clear, unclear): (Vec<Cause>, Vec<Cause>) = measured
         .contradictions()
         .into_iter()
         .filter(|cause| tells || cause.deviations() > FAR)
-        .filter(|cause| causes.iter().all(|own| own.found.name != cause.found.name))
         .partition(Cause::is_clear);
-    // Sensors tell it better than a model in which others make up for it.
-    suspected.retain(|own| {
-        let mut all = clear.iter().chain(&unclear);
-        all.all(|told| told.found.name != own.found.name)
-    });
     causes.extend(clear);
     suspected.splice(0..0, unclear);
     let leaves_nothing = confirmed.leaves_nothing();
     let is_answered = !confirmed.effects.is_empty() || !causes.is_empty() || leaves_nothing;
     // What was found and is not named is ranked.
-    if !is_answered && !observer.is_over() {
-        let proposed = [&start.point, &as_described.point, &swapped.point];
-        weighed.extend(unnamed(measured, proposed));
+    if !is_answered {
+        let others = found_alone.unwrap_or_else(|| unnamed(measured, proposed, observer));
+        weighed.extend(others);
     }
     let told = [&causes[..], &found.doubted, &suspected];
     let readings = readings(measured, weighed, told, (&confirmed, crossed));
@@ -412,7 +436,14 @@ fn readings<M: InParts>(
 }
 
 /// The models of different effects among those `proposed`, fitted to all data, without effects that these do not show.
-fn unnamed<M: InParts>(measured: &M, proposed: [&Point; 3]) -> Vec<Weighed> {
+fn unnamed<M: InParts>(
+    measured: &M,
+    proposed: [&Point; 3],
+    observer: Observer<'_>,
+) -> Vec<Weighed> {
+    if observer.is_over() {
+        return Vec::new();
+    }
     let mut known = BTreeSet::from([BTreeSet::new()]);
     let weighed = proposed.into_iter().filter_map(|point| {
         let (found, deviations) = refit(measured, point, EVERYTHING)?;

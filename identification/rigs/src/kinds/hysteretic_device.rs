@@ -327,7 +327,7 @@ impl Equations for HystereticDevice {
 
     fn contradictions(&self, recordings: &[RigRecording]) -> Vec<Cause> {
         let zero = zero_in_the_gap(recordings, Channel::Displacement);
-        let cause = zero.and_then(|found| Cause::perhaps(found, (0.0, 0.0)));
+        let cause = zero.map(|found| Cause { found, stated: 0.0 });
         cause.into_iter().collect()
     }
 }

@@ -79,6 +79,9 @@ fn levels(displacement: &[f64], force: &[f64]) -> Option<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::measured::Measured;
+    use super::super::parts::InParts;
+    use super::super::{Measurement, of_kind};
     use super::*;
     use recordings::Recording;
 
@@ -121,5 +124,29 @@ mod tests {
         assert!(zero(&[recorded(0.0)]).is_none());
         assert!(zero(&[recorded(4.0), recorded(0.0)]).is_none());
         assert!(zero(&[]).is_none());
+    }
+
+    #[test]
+    fn a_zero_that_is_read_is_a_cause_unless_it_is_as_stated_and_no_fit_tells_it() {
+        let rig = of_kind("hysteretic_device").unwrap();
+        let judged = |gap: f64, stated: f64| {
+            let measurement = Measurement {
+                recordings: vec![recorded(gap)],
+            };
+            let nominal = rig.parameters().iter().map(|(name, _)| match *name {
+                "load_cell_zero" => (stated, 100.0),
+                _ => (1e4, 1e3),
+            });
+            let measured = Measured::new(rig, &measurement, nominal.collect());
+            let causes = measured.contradictions();
+            let causes: Vec<(f64, bool)> = causes
+                .iter()
+                .map(|own| (own.stated, own.is_clear()))
+                .collect();
+            (causes, measured.is_read("load_cell_zero"))
+        };
+        assert_eq!(judged(4.0, 0.0), (vec![(0.0, true)], true));
+        assert_eq!(judged(4.0, 700.0), (Vec::new(), true));
+        assert_eq!(judged(0.0, 0.0), (Vec::new(), false));
     }
 }

@@ -156,6 +156,12 @@ impl<'a> Measured<'a> {
     }
 
     /// Whether the nominal parameter `i` is counted by its logarithm.
+    /// The place of a nominal parameter.
+    fn place(&self, name: &str) -> Option<usize> {
+        let mut all = self.rig.parameters().iter();
+        all.position(|(own, _)| *own == name)
+    }
+
     fn is_logarithmic(&self, i: usize) -> bool {
         let (value, deviation) = self.nominal[i];
         value > 0.0 && deviation <= value
@@ -623,17 +629,21 @@ impl InParts for Measured<'_> {
     }
 
     fn contradictions(&self) -> Vec<Cause> {
-        let parameters = self.rig.parameters();
-        let place = |name: &str| parameters.iter().position(|(own, _)| *own == name);
         let causes = self.rig.contradictions(&self.measurement.recordings);
         // Of a nominal parameter it is what was stated that they contradict.
         let causes = causes
             .into_iter()
-            .filter_map(|cause| match place(&cause.found.name) {
+            .filter_map(|cause| match self.place(&cause.found.name) {
                 Some(i) => Cause::perhaps(cause.found, self.nominal[i]),
                 None => Some(cause),
             });
         causes.collect()
+    }
+
+    fn is_read(&self, name: &str) -> bool {
+        let causes = self.rig.contradictions(&self.measurement.recordings);
+        let mut read = causes.iter().filter(|own| own.found.name == name);
+        self.place(name).is_some() && read.next().is_some()
     }
 }
 

@@ -181,7 +181,8 @@ pub trait Equations: Sync {
         Vec::new()
     }
 
-    /// Sensors of `recordings` that contradict each other.
+    /// Sensors of `recordings` that contradict each other, and nominal parameters that sensors alone tell, whether they
+    /// are as stated or not.
     fn contradictions(&self, _recordings: &[RigRecording]) -> Vec<Cause> {
         Vec::new()
     }

@@ -178,9 +178,14 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         point.clone()
     }
 
-    /// Sensors that contradict each other.
+    /// Sensors that contradict each other, or what was stated.
     fn contradictions(&self) -> Vec<Cause> {
         Vec::new()
+    }
+
+    /// Whether sensors alone tell the nominal parameter `name`.
+    fn is_read(&self, _name: &str) -> bool {
+        false
     }
 
     /// The name of a candidate.
