@@ -296,7 +296,10 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         own > NEAR && own.powi(2) > WORSE * alone.extended_error.powi(2)
     };
     let mut found_alone = None;
-    if is_behind(confirmed.error, &as_described) || is_behind(confirmed.swapped_error, &swapped) {
+    if !confirmed.effects.is_empty()
+        && (is_behind(confirmed.error, &as_described)
+            || is_behind(confirmed.swapped_error, &swapped))
+    {
         let mut others = unnamed(measured, proposed, observer);
         let is_far = |own: &Weighed| own.crossed.likelier_than(&crossed) > LIKELIER;
         if others.iter().any(is_far) {
