@@ -4,7 +4,6 @@ use std::fs;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use fmi_rs::{SHARED_LIBRARY_EXTENSION, fmi2, fmi3};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
@@ -252,14 +251,6 @@ pub(super) fn platforms(unpacked: &Path) -> Vec<String> {
     names
 }
 
-/// This platform's folder in `binaries`.
-pub(super) fn this_platform(version: FmiVersion) -> &'static str {
-    match version {
-        FmiVersion::V2 => fmi2::PLATFORM,
-        FmiVersion::V3 => fmi3::native::PLATFORM_TUPLE,
-    }
-}
-
 /// The library to load, after a look at what it was built for.
 pub(super) fn binary(
     fmu: &Path,
@@ -271,15 +262,15 @@ pub(super) fn binary(
         fmu: fmu.to_path_buf(),
         reason,
     };
-    let platform = this_platform(version);
-    let name = format!("{model_identifier}{SHARED_LIBRARY_EXTENSION}");
+    let platform = version.platform();
+    let name = format!("{model_identifier}{}", std::env::consts::DLL_SUFFIX);
     let relative = format!("binaries/{platform}/{name}");
     let path = unpacked.join(&relative);
     if !path.is_file() {
         let there = platforms(unpacked);
         return Err(missing(if there.is_empty() {
             format!("no binary: `{relative}` is missing and there are none for other platforms")
-        } else if there.iter().any(|folder| folder == platform) {
+        } else if there.contains(&platform) {
             format!("no binary: `{relative}` is missing (is the modelIdentifier right?)")
         } else {
             format!(

@@ -19,7 +19,7 @@ mod trace;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
@@ -40,9 +40,6 @@ pub use trace::Trace;
 
 /// What helps where a component of this project is not whole, or of another machine.
 pub const CURE: &str = "install again, or pass the folder of this platform's FMUs with --fmus";
-
-/// `fmi-rs` checks variable names with a parser that keeps its state in globals: one at a time.
-static PARSER: Mutex<()> = Mutex::new(());
 
 /// An FMU file: described and unpacked, not yet loaded.
 #[derive(Debug, Clone)]
@@ -112,10 +109,7 @@ impl Fmu {
             source,
         })?;
         let unpacked = archive::unpack(archive::FMU, path, &bytes)?;
-        let description = {
-            let _alone = PARSER.lock().unwrap_or_else(PoisonError::into_inner);
-            description::read(path, unpacked.path(), &HashMap::new(), false)?
-        };
+        let description = description::read(path, unpacked.path(), &HashMap::new(), false)?;
         let platforms = archive::platforms(unpacked.path());
         Ok(Self {
             path: path.to_path_buf(),
@@ -162,7 +156,6 @@ impl Fmu {
     }
 
     fn described(&self, sizes: HashMap<u32, u64>, exchange: bool) -> Result<Arc<Self>, FmuError> {
-        let _alone = PARSER.lock().unwrap_or_else(PoisonError::into_inner);
         let unpacked = self.unpacked.path();
         Ok(Arc::new(Self {
             description: description::read(&self.path, unpacked, &sizes, exchange)?,

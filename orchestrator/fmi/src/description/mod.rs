@@ -1,11 +1,16 @@
 //! What an FMU says of itself, the same for FMI 2.0 and 3.0.
 
+mod attribute;
 mod clock;
-mod fmi2;
-mod fmi3;
 mod kind;
+mod reader;
+#[cfg(feature = "fmi-rs")]
+mod second_reader;
 mod structure;
 mod terminal;
+#[cfg(test)]
+mod tests;
+mod variables;
 
 use std::collections::HashMap;
 use std::fmt;
@@ -47,16 +52,26 @@ impl FmiVersion {
         }
     }
 
+    /// This machine's folder in `binaries` of an FMU: `linux64` in FMI 2.0, `x86_64-linux` in FMI 3.0.
+    pub fn platform(self) -> String {
+        use std::env::consts::{ARCH, OS};
+        let old = match (OS, ARCH) {
+            ("linux", "x86_64") => Some("linux64"),
+            ("linux", "x86") => Some("linux32"),
+            ("windows", "x86_64") => Some("win64"),
+            ("windows", "x86") => Some("win32"),
+            ("macos", "x86_64") => Some("darwin64"),
+            _ => None,
+        };
+        match old.filter(|_| self == Self::V2) {
+            Some(old) => old.to_string(),
+            None => format!("{ARCH}-{}", if OS == "macos" { "darwin" } else { OS }),
+        }
+    }
+
     /// The folder inside an FMU that holds the library for this machine.
     pub fn binaries(self) -> String {
-        let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
-        match (self, os, arch) {
-            (Self::V2, "linux", "x86_64") => "binaries/linux64".into(),
-            (Self::V2, "windows", "x86_64") => "binaries/win64".into(),
-            (Self::V2, "macos", "x86_64") => "binaries/darwin64".into(),
-            (_, "macos", arch) => format!("binaries/{arch}-darwin"),
-            (_, os, arch) => format!("binaries/{arch}-{os}"),
-        }
+        format!("binaries/{}", self.platform())
     }
 }
 
@@ -337,16 +352,14 @@ pub(super) fn read(
             root.tag_name().name()
         )));
     }
-    let mut description = match root.attribute("fmiVersion") {
+    let version = match root.attribute("fmiVersion") {
         None => {
             return Err(wrong(
                 "the attribute fmiVersion is missing; expected \"2.0\" or \"3.0\"".to_string(),
             ));
         }
-        Some("2.0") => fmi2::read(&text, root, exchange).map_err(refused)?,
-        Some(version) if version.starts_with("3.") => {
-            fmi3::read(&text, root, sizes, exchange).map_err(refused)?
-        }
+        Some("2.0") => FmiVersion::V2,
+        Some(version) if version.starts_with("3.") => FmiVersion::V3,
         Some("1.0") => {
             let tool = root.attribute("generationTool");
             return Err(wrong(format!(
@@ -361,6 +374,11 @@ pub(super) fn read(
             )));
         }
     };
+    let mut description = reader::read(root, version, sizes, exchange).map_err(refused)?;
+    #[cfg(feature = "fmi-rs")]
+    description
+        .remarks
+        .extend(second_reader::remarks(version, &text));
     let name = &description.model_identifier;
     let mut letters = name.bytes();
     let starts_well = letters
@@ -388,22 +406,4 @@ pub(super) fn read(
     }
     structure::name(&mut description, root).map_err(refused)?;
     Ok(description)
-}
-
-fn preferred_step(
-    experiment: Option<&fmi_rs::model_description::DefaultExperiment>,
-) -> Option<f64> {
-    let step = experiment?.stepSize.as_ref()?.parse().ok()?;
-    (step > 0.0).then_some(step)
-}
-
-fn default_stop(experiment: Option<&fmi_rs::model_description::DefaultExperiment>) -> Option<f64> {
-    let experiment = experiment?;
-    let stop: f64 = experiment.stopTime.as_ref()?.parse().ok()?;
-    let start = experiment
-        .startTime
-        .as_ref()
-        .and_then(|text| text.parse().ok());
-    let length = stop - start.unwrap_or(0.0);
-    (length > 0.0 && length.is_finite()).then_some(length)
 }

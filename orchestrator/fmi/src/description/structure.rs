@@ -3,9 +3,9 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use fmi_rs::model_description::ModelDescriptionError;
 use roxmltree::Node;
 
+use super::attribute::{Remarks, at, child, children};
 use super::{Causality, Description, Variable};
 
 /// Why a description cannot be used.
@@ -17,9 +17,16 @@ pub(super) enum DescriptionError {
     /// Not XML.
     #[error(transparent)]
     Xml(#[from] roxmltree::Error),
-    /// Not as the schema has it.
-    #[error(transparent)]
-    Schema(#[from] ModelDescriptionError),
+    /// An element that is not as expected.
+    #[error("line {line}: {element}: {reason}")]
+    At {
+        /// Its line, from 1.
+        line: u32,
+        /// The element, with its name or its parent's.
+        element: String,
+        /// What is wrong and what was expected.
+        reason: String,
+    },
     /// No interface of FMI 2.0.
     #[error("neither <CoSimulation> nor <ModelExchange>")]
     NoInterface2,
@@ -29,31 +36,6 @@ pub(super) enum DescriptionError {
     /// Arrays that nobody could hold.
     #[error("the arrays have more than {MOST_ELEMENTS} elements together")]
     Elements,
-    /// An array whose size is another variable.
-    #[error("`{array}`: its size is a variable that is not a structural parameter")]
-    NotStructural {
-        /// The array.
-        array: String,
-    },
-    /// An array whose size has no value.
-    #[error("`{array}`: its size `{size}` has no start value")]
-    NoSize {
-        /// The array.
-        array: String,
-        /// The structural parameter.
-        size: String,
-    },
-    /// An array that is too large for this computer.
-    #[error("`{array}`: its size {size} is too large")]
-    Size {
-        /// The array.
-        array: String,
-        /// Its size.
-        size: u64,
-    },
-    /// An output of no variable.
-    #[error("<ModelStructure> lists an output that is not among the variables")]
-    Output,
     /// Two variables of one name.
     #[error("the variable `{name}` occurs twice (as number {first} and {second})")]
     Twice {
@@ -136,18 +118,20 @@ impl BaseUnit {
     }
 }
 
-/// Units that a description of either version defines in terms of SI. `fmi-rs` 0.3 finds none in FMI 2.0: it looks for
-/// `UnitDefintions`.
-pub(super) fn units<'a>(root: Node<'a, 'a>) -> HashMap<&'a str, BaseUnit> {
-    root.children()
-        .filter(|node| node.has_tag_name("UnitDefinitions"))
-        .flat_map(|node| node.children())
-        .filter(|node| node.has_tag_name("Unit"))
-        .filter_map(|unit| {
-            let base = unit.children().find(|node| node.has_tag_name("BaseUnit"))?;
-            Some((unit.attribute("name")?, BaseUnit::read(base).ok()?))
-        })
-        .collect()
+/// Units that a description of either version defines in terms of SI.
+pub(super) fn units<'a>(root: Node<'a, 'a>, remarks: &mut Remarks) -> HashMap<&'a str, BaseUnit> {
+    let all = children(child(root, "UnitDefinitions"), "Unit");
+    all.filter_map(|unit| {
+        let base = child(unit, "BaseUnit")?;
+        match BaseUnit::read(base) {
+            Ok(read) => Some((unit.attribute("name")?, read)),
+            Err(error) => {
+                remarks.note(|| at(base, error.to_string()));
+                None
+            }
+        }
+    })
+    .collect()
 }
 
 /// The largest number of elements that the arrays of an FMU may have together.
@@ -183,17 +167,14 @@ pub(super) struct Dependencies {
 }
 
 impl Dependencies {
-    /// Notes the inputs among `known` (all inputs, by default) as dependencies of an
-    /// output.
-    ///
-    /// # Errors
-    /// There is no variable at `output`.
+    /// Notes the inputs among `known` (all inputs, by default) as dependencies of the variable at
+    /// `output`.
     pub(super) fn note(
         &mut self,
         variables: &mut [Variable],
         output: usize,
         known: Option<Vec<usize>>,
-    ) -> Result<(), DescriptionError> {
+    ) {
         let is_input = |index: &usize| {
             variables
                 .get(*index)
@@ -217,9 +198,7 @@ impl Dependencies {
                 all.clone()
             }
         };
-        let output = variables.get_mut(output);
-        output.ok_or(DescriptionError::Output)?.dependencies = dependencies;
-        Ok(())
+        variables[output].dependencies = dependencies;
     }
 }
 

@@ -127,9 +127,8 @@ pub fn packed(description: &str, library: &[u8]) -> Arc<Fmu> {
 /// Writes an FMU with `more` files.
 pub fn pack(path: &Path, description: &str, library: &[u8], more: &[(&str, &str)]) {
     // Folders of both versions.
-    let platforms = [fmi_rs::fmi2::PLATFORM, fmi_rs::fmi3::native::PLATFORM_TUPLE];
-    let extension = fmi_rs::SHARED_LIBRARY_EXTENSION;
-    let libraries = platforms.map(|own| format!("binaries/{own}/minimal{extension}"));
+    let folders = FmiVersion::ALL.map(FmiVersion::binaries);
+    let libraries = folders.map(|own| format!("{own}/minimal{}", std::env::consts::DLL_SUFFIX));
     let mut files = vec![("modelDescription.xml", description.as_bytes())];
     files.extend(libraries.iter().map(|name| (name.as_str(), library)));
     files.extend(more.iter().map(|(name, text)| (*name, text.as_bytes())));
