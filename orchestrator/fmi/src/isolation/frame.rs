@@ -9,6 +9,7 @@ use memmap2::MmapMut;
 
 use super::ring::Ring;
 use super::turn::Turn;
+use crate::folder::{Removed, unused};
 
 /// Bytes for calls and their values, the first that the system grants: a limit of the size of files
 /// counts here too. What is not used takes no memory.
@@ -36,7 +37,7 @@ pub(super) struct Way {
     pub path: PathBuf,
     /// The descriptor that the guest inherits.
     pub inherited: Option<i32>,
-    _file: Option<tempfile::TempPath>,
+    _file: Option<Removed>,
 }
 
 impl Frame {
@@ -195,13 +196,19 @@ fn seal(_file: &File) {}
 
 /// A file, where there is no memory without a name.
 fn named() -> io::Result<(File, Way)> {
-    let mut builder = tempfile::Builder::new();
-    let file = builder.prefix("shakebench-calls-").tempfile()?;
-    let (file, path) = file.into_parts();
+    let path = unused("shakebench-calls-");
+    let mut options = OpenOptions::new();
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let file = options
+        .read(true)
+        .write(true)
+        .create_new(true)
+        .open(&path)?;
     let way = Way {
-        path: path.to_path_buf(),
+        path: path.clone(),
         inherited: None,
-        _file: Some(path),
+        _file: Some(Removed(path)),
     };
     Ok((file, way))
 }

@@ -1,8 +1,7 @@
 //! Processes that FMUs start and leave behind. They end with the guest: those of its group by the
 //! group, those that left it (daemons) by a mark in the environment that they inherited.
 
-use std::hash::{BuildHasher, RandomState};
-use std::time::{SystemTime, UNIX_EPOCH};
+use crate::folder::unique;
 
 /// The variable of the environment that holds the mark.
 pub(super) const VARIABLE: &str = "SHAKEBENCH_GUEST";
@@ -14,11 +13,7 @@ pub(super) struct Mark(String);
 impl Mark {
     /// A mark that no other guest has.
     pub(super) fn new() -> Self {
-        // Two guests may begin at one reading of the clock.
-        let random = RandomState::new().hash_one(());
-        let now = SystemTime::now().duration_since(UNIX_EPOCH);
-        let now = now.map_or(0, |since| since.as_nanos());
-        Self(format!("{}-{random:x}-{now}", std::process::id()))
+        Self(unique())
     }
 
     pub(super) fn value(&self) -> &str {
