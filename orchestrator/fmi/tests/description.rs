@@ -466,3 +466,26 @@ fn locals_become_outputs_with_their_whole_arrays() {
     assert_eq!(outputs(&[3]), [2, 3, 4]);
     assert_eq!(outputs(&[1, 5]), [1, 5]);
 }
+
+#[cfg(feature = "fmi-rs")]
+#[test]
+fn what_fmi_rs_finds_or_refuses_is_a_remark() {
+    let remarks = |variables: &str| {
+        let fmu = opened(&third(STEPS, variables, "")).unwrap();
+        fmu.description.remarks.clone()
+    };
+    assert_eq!(
+        remarks(r#"<Float64 name="x" valueReference="1"/>"#),
+        [""; 0]
+    );
+    let found = remarks(r#"<Float64 name="y" valueReference="1" causality="output"/>"#);
+    assert!(
+        found[0].contains("outputs do not match the expected set"),
+        "{found:?}"
+    );
+    let refused = remarks(r#"<Float64 name="x" valueReference="1" nominal="one"/>"#);
+    assert!(
+        refused[0].starts_with("fmi-rs cannot read it"),
+        "{refused:?}"
+    );
+}

@@ -233,3 +233,28 @@ fn violations_of_the_standard_are_errors_with_a_status() {
     );
     assert_eq!(status, Some(2));
 }
+
+#[test]
+fn what_the_second_reader_of_descriptions_finds_is_a_remark() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let offer = Offer {
+        is_fmi3: false,
+        derivatives: 0,
+    };
+    pack(folder, "sound", offer);
+    let odd = INPUT.replace("start", r#"reinit="perhaps" start"#);
+    let [sound, other] = ["sound.fmu", "other.fmu"].map(|name| folder.join(name));
+    changed(&sound, &other, [INPUT, &odd], &[]);
+    let remark = "fmi-rs cannot read it: Illegal value 'perhaps' for attribute 'reinit' in <Real>.";
+    let output = shakebench(folder, &["info", "other.fmu"]);
+    assert!(
+        stdout(&output).contains(&format!("remark: {remark}")),
+        "{}",
+        stdout(&output)
+    );
+    let output = shakebench(folder, &["validate", "other.fmu"]);
+    assert!(stdout(&output).contains(remark), "{}", stdout(&output));
+    let output = shakebench(folder, &["info", "sound.fmu"]);
+    assert!(!stdout(&output).contains("remark"), "{}", stdout(&output));
+}
