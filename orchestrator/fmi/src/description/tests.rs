@@ -451,6 +451,57 @@ fn derivatives_of_fmi_3_are_named_by_value_reference() {
 }
 
 #[test]
+fn every_type_of_fmi_3_is_read_by_its_name() {
+    let all = [
+        Kind::Float64,
+        Kind::Float32,
+        Kind::Int8,
+        Kind::UInt8,
+        Kind::Int16,
+        Kind::UInt16,
+        Kind::Int32,
+        Kind::UInt32,
+        Kind::Int64,
+        Kind::UInt64,
+        Kind::Boolean,
+        Kind::String,
+        Kind::Binary,
+        Kind::Clock,
+        Kind::Enumeration(Vec::new()),
+    ];
+    for kind in all {
+        let name = kind.name();
+        let more = r#"declaredType="none" intervalVariability="triggered""#;
+        let own = of(
+            V3,
+            &format!(r#"<{name} name="x" valueReference="1" {more}/>"#),
+        );
+        assert_eq!(own.unwrap().variables[0].kind, kind);
+    }
+}
+
+#[test]
+fn a_type_gives_its_quantity_to_floating_point_variables_alone() {
+    let head = r#"<ModelExchange modelIdentifier="m" fixedInternalStepSize="1"/>
+        <UnitDefinitions><Unit name="degC"><BaseUnit K="1" offset="273.15"/></Unit></UnitDefinitions>
+        <TypeDefinitions><Float64Type name="Rise" unit="degC" relativeQuantity="true" max="9"/></TypeDefinitions>"#;
+    let variables = r#"<Float64 name="x" valueReference="1" declaredType="Rise"/>
+        <Int32 name="n" valueReference="2" declaredType="Rise" min="1"/>"#;
+    let own = read(V3, &text(V3, head, variables, "")).unwrap();
+    let [x, n] = &own.variables[..] else {
+        panic!("{:?}", own.variables);
+    };
+    assert_eq!(
+        (x.unit.as_deref(), x.bounds),
+        (Some("degC"), [None, Some(9.0)])
+    );
+    assert_eq!(x.base_unit.unwrap().offset, 0.0);
+    assert_eq!((&n.unit, n.bounds), (&None, [None; 2]));
+    // It steps nothing.
+    assert_eq!(own.internal_step, None);
+}
+
+#[test]
 fn what_can_be_done_without_is_a_remark() {
     let head = r#"<CoSimulation modelIdentifier="m" fixedInternalStepSize="short"/>
         <UnitDefinitions><Unit name="u"><BaseUnit m="1.5"/></Unit><Unit name="v"><BaseUnit m=" 1 "/></Unit></UnitDefinitions>
