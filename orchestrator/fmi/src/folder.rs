@@ -56,6 +56,7 @@ impl Folder {
         SWEPT.call_once(|| sweep(&std::env::temp_dir()));
         let path = unused(PREFIX);
         let mut builder = DirBuilder::new();
+        builder.recursive(false);
         #[cfg(unix)]
         std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
         builder.create(&path)?;
