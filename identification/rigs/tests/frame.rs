@@ -110,68 +110,104 @@ fn error(measured: impl Iterator<Item = f64> + Clone, simulated: &[f64]) -> f64 
     (off / size).sqrt()
 }
 
-#[test]
-fn a_written_model_predicts_drifts_and_force_from_table_and_voltage_alone() {
-    let building = Building {
-        masses: [1600.0, 3000.0],
-        springs: [31e3, 370e3],
-        dashpots: [300.0, 500.0],
-        friction: [60.0, 40.0],
-        yields_at: 80.0 + 290.0 * 3.0,
-        over: 4e-4,
-        creep: 13.0,
-        sharpness: 4.0,
-        centring: (70.0, 1e-3),
-        push: 20.0,
-    };
-    let rows = building.shaken(0.6, 1500);
-    let folder = tempfile::tempdir().unwrap();
-    let mut text = String::from("t,table,volts,drift,upper,force\n");
-    for (k, row) in rows.iter().enumerate() {
-        writeln!(text, "{:.2},{:.7},3,,,", k as f64 * PERIOD, 1e3 * row[0]).unwrap();
-    }
-    std::fs::write(folder.path().join("later.csv"), text).unwrap();
-    let nominal = r#"
-mass = { value = 1600, unit = "kg" }
-stiffness = { value = 31, unit = "kN/m" }
-damping = { value = 300, unit = "N s/m" }
-friction = { value = 60, unit = "N" }
-upper_mass = { value = 3000, unit = "kg" }
-upper_stiffness = { value = 370, unit = "kN/m" }
-upper_damping = { value = 500, unit = "N s/m" }
-device_friction = { value = 80, unit = "N" }
-friction_by_command = { value = 290, unit = "N/V" }
-build_up = { value = 0.4, unit = "mm" }
-offset = { value = 20, unit = "N" }
-"#;
+const BUILDING: Building = Building {
+    masses: [1600.0, 3000.0],
+    springs: [31e3, 370e3],
+    dashpots: [300.0, 500.0],
+    friction: [60.0, 40.0],
+    yields_at: 80.0 + 290.0 * 3.0,
+    over: 4e-4,
+    creep: 13.0,
+    sharpness: 4.0,
+    centring: (70.0, 1e-3),
+    push: 20.0,
+};
+
+/// A written model of that building; `device` and `effects` are those of the device.
+fn written(folder: &Path, columns: &str, device: &str, effects: &str) -> ExtendedRig {
+    let nominal = format!(
+        r#"
+mass = {{ value = 1600, unit = "kg" }}
+stiffness = {{ value = 31, unit = "kN/m" }}
+damping = {{ value = 300, unit = "N s/m" }}
+friction = {{ value = 60, unit = "N" }}
+upper_mass = {{ value = 3000, unit = "kg" }}
+upper_stiffness = {{ value = 370, unit = "kN/m" }}
+upper_damping = {{ value = 500, unit = "N s/m" }}
+build_up = {{ value = 0.4, unit = "mm" }}
+offset = {{ value = 20, unit = "N" }}
+{device}"#
+    );
     let tables = ["described", "refitted", "nominal"].map(|name| format!("[{name}]{nominal}"));
     let model = format!(
-        "name = \"Frame\"\nkind = \"frame\"\n{COLUMNS}\
-         columns.upper_drift = {{ column = \"upper\", unit = \"mm\" }}\n{}\
-         [effects.device_creep]\nrate = {{ value = 13, unit = \"1/s\" }}\n\
-         exponent = {{ value = 4, unit = \"1\" }}\n\
+        "name = \"Frame\"\nkind = \"frame\"\n{columns}\
+         columns.upper_drift = {{ column = \"upper\", unit = \"mm\" }}\n{}{effects}\
          [effects.upper_friction]\nforce = {{ value = 40, unit = \"N\" }}\n\
          [effects.centring]\nforce = {{ value = 70, unit = \"N\" }}\n\
          width = {{ value = 1, unit = \"mm\" }}\n",
         tables.concat()
     );
-    let path = folder.path().join("model.toml");
+    let path = folder.join("model.toml");
     std::fs::write(&path, model).unwrap();
-    let model = ExtendedRig::read(&path).unwrap();
-    let found = model
-        .predict(&folder.path().join("later.csv"), false)
-        .unwrap();
+    ExtendedRig::read(&path).unwrap()
+}
+
+/// Whether `model` predicts the columns from a file of the table's motion and of what `given` writes of a row.
+fn predicts(
+    model: &ExtendedRig,
+    folder: &Path,
+    given: impl Fn(&[f64; 4]) -> String,
+    expected: &[(&str, usize, f64)],
+) {
+    let rows = BUILDING.shaken(0.6, 1500);
+    let mut text = String::from("t,table,volts,drift,upper,force\n");
+    for (k, row) in rows.iter().enumerate() {
+        let (t, table) = (k as f64 * PERIOD, 1e3 * row[0]);
+        writeln!(text, "{t:.2},{table:.7},{}", given(row)).unwrap();
+    }
+    let file = folder.join("later.csv");
+    std::fs::write(&file, text).unwrap();
+    let found = model.predict(&file, false).unwrap();
+    assert_eq!(found.columns.len(), expected.len());
+    for (column, (name, place, unit)) in found.columns.iter().zip(expected) {
+        assert_eq!(column.channel, *name);
+        let own = error(rows.iter().map(|row| unit * row[*place]), &column.rows);
+        assert!(own < 0.02, "{name}: {own}");
+    }
+}
+
+#[test]
+fn a_written_model_predicts_drifts_and_force_from_table_and_voltage_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = written(
+        folder.path(),
+        COLUMNS,
+        "device_friction = { value = 80, unit = \"N\" }\n\
+         friction_by_command = { value = 290, unit = \"N/V\" }\n",
+        "[effects.device_creep]\nrate = { value = 13, unit = \"1/s\" }\n\
+         exponent = { value = 4, unit = \"1\" }\n",
+    );
     let expected = [
         ("drift", 1, 1e3),
         ("upper_drift", 2, 1e3),
         ("force", 3, 1.0),
     ];
-    for (column, (name, place, unit)) in found.columns.iter().zip(expected) {
-        assert_eq!(column.channel, name);
-        let own = error(rows.iter().map(|row| unit * row[place]), &column.rows);
-        assert!(own < 0.02, "{name}: {own}");
-    }
-    assert_eq!(found.columns.len(), 3);
+    predicts(&model, folder.path(), |_| "3,,,".to_owned(), &expected);
+}
+
+#[test]
+fn a_recorded_force_of_a_device_acts_as_it_was_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = COLUMNS
+        .replace("columns.force", "columns.device_force")
+        .replace(
+            "columns.command = { column = \"volts\", unit = \"V\" }\n",
+            "",
+        );
+    let model = written(folder.path(), &columns, "", "");
+    let expected = [("drift", 1, 1e3), ("upper_drift", 2, 1e3)];
+    let given = |row: &[f64; 4]| format!(",,,{:.4}", row[3]);
+    predicts(&model, folder.path(), given, &expected);
 }
 
 fn description(folder: &Path, late: usize) -> Description {
