@@ -6,7 +6,8 @@
 //! chance, with correlated samples counted once. Backward at the end by the same test. Every model
 //! in every comparison is the least-squares one ([`super::least_squares`]).
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
+use std::sync::{Mutex, PoisonError};
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -298,7 +299,12 @@ struct CrossValidation<'a, M: SimulatedModel> {
     without: Vec<Simulated>,
     /// The effect that is not tried.
     barred: Option<usize>,
+    /// Errors of the latest models on the folds: what a round takes is what the next one compares with.
+    known: Mutex<VecDeque<(Point, [Vec<f64>; 2])>>,
 }
+
+/// Models of which errors on the folds are kept.
+const KEPT: usize = 16;
 
 impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
     fn new(model: &'a M, record: usize, observer: Observer<'a>) -> Self {
@@ -310,6 +316,7 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             deviates: Vec::new(),
             without: Vec::new(),
             barred: None,
+            known: Mutex::default(),
         }
     }
 
@@ -405,6 +412,11 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
     /// Errors of `fitted` on each fold when its parameters are refitted to the other.
     fn crossed(&self, fitted: &Simulated) -> Option<[Vec<f64>; 2]> {
         let model = self.model;
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = known().iter().find(|own| own.0 == fitted.point).cloned();
+        if let Some((_, errors)) = same {
+            return Some(errors);
+        }
         let [one, two] = model.folds(self.record);
         let on_other = |own: usize, tested: usize| {
             let refitted = settle(model, &fitted.point, own, AGAIN)?;
@@ -412,7 +424,13 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             Some(all_errors(model, &point, tested))
         };
         let (first, second) = rayon::join(|| on_other(two, one), || on_other(one, two));
-        Some([first?, second?])
+        let errors = [first?, second?];
+        let mut known = known();
+        if known.len() == KEPT {
+            known.pop_front();
+        }
+        known.push_back((fitted.point.clone(), errors.clone()));
+        Some(errors)
     }
 
     /// The extensions of `base` by one of `among` that fit best.
