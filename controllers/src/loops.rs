@@ -477,3 +477,149 @@ impl Channel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loop_shaping::LoopShaping;
+    use crate::pid::PidInput;
+    use crate::three_variable::{ThreeVariableControl, ThreeVariableInput};
+    use crate::{Controller, Motion};
+
+    const PERIOD: f64 = 0.002;
+
+    /// Signals without regularity, from -1 to 1.
+    fn signals(samples: usize) -> Vec<Signals> {
+        let mut state = 1_u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+        };
+        let rows = (0..samples).map(|_| Signals::from_fn(|_, _| next()));
+        rows.collect()
+    }
+
+    /// The commands of a linear law as sampled.
+    fn commands(law: &LinearLaw, signals: &[Signals]) -> Vec<f64> {
+        let of = |channel: &Channel| channel.sampled.order();
+        let mut states: Vec<_> = law
+            .channels
+            .iter()
+            .map(|own| DVector::zeros(of(own)))
+            .collect();
+        let step = |row: &Signals| {
+            let mut command = row.dot(&law.direct);
+            for (channel, state) in law.channels.iter().zip(&mut states) {
+                let (own, input) = (&channel.sampled, row.dot(&channel.signals));
+                command += (&own.c * &*state)[0] + own.d[0] * input;
+                *state = &own.a * &*state + own.b.column(0) * input;
+            }
+            command
+        };
+        signals.iter().map(step).collect()
+    }
+
+    fn assert_same(law: &LinearLaw, runs: &mut dyn FnMut(&Signals) -> f64) {
+        let signals = signals(200);
+        for (k, (command, row)) in commands(law, &signals).iter().zip(&signals).enumerate() {
+            let expected = runs(row);
+            let size = expected.abs().max(1.0);
+            assert!(
+                (command - expected).abs() < 1e-9 * size,
+                "sample {k}: {command} {expected}"
+            );
+        }
+    }
+
+    fn motion(row: &Signals, first: usize) -> Motion {
+        Motion {
+            displacement: row[first],
+            velocity: row[first + 1],
+            acceleration: row[first + 2],
+        }
+    }
+
+    #[test]
+    fn a_sampled_loop_is_the_law_that_runs() {
+        let mut pid = Pid {
+            integral: 300.0,
+            integral_leak: 40.0,
+            derivative: 0.0,
+            limit: 1e12,
+            ..Pid::equation_3_6()
+        };
+        for controlled in [Controlled::Displacement, Controlled::Force] {
+            pid.reset();
+            let law = LinearLaw::pid(&pid, controlled, PERIOD).unwrap();
+            assert_same(&law, &mut |row| {
+                let input = PidInput {
+                    reference: row[MEASURED],
+                    measured: row[controlled as usize],
+                };
+                pid.step(&input, PERIOD)
+            });
+        }
+        let mut shaped = LoopShaping {
+            limit: 1e12,
+            ..LoopShaping::default()
+        };
+        shaped.sections[0] = Section {
+            b2: 1e-4,
+            b1: 3e-3,
+            a2: 4e-4,
+            a1: 1e-2,
+        };
+        let law = LinearLaw::shaped(&shaped, PERIOD).unwrap();
+        assert_same(&law, &mut |row| {
+            let input = PidInput {
+                reference: row[MEASURED],
+                measured: row[0],
+            };
+            shaped.step(&input, PERIOD)
+        });
+        let gains = ThreeVariableGains {
+            integral: 50.0,
+            ..ThreeVariableGains::table_3_2()
+        };
+        let law = LinearLaw::three_variable(&gains, PERIOD).unwrap();
+        let mut runs = ThreeVariableControl {
+            gains,
+            limit: 1e12,
+            integral: 0.0,
+        };
+        assert_same(&law, &mut |row| {
+            let input = ThreeVariableInput {
+                reference: motion(row, MEASURED),
+                measured: motion(row, 0),
+            };
+            runs.step(&input, PERIOD)
+        });
+    }
+
+    #[test]
+    fn a_continuous_loop_is_the_printed_one() {
+        let pid = Pid {
+            integral: 300.0,
+            integral_leak: 40.0,
+            derivative: 0.0,
+            ..Pid::equation_3_6()
+        };
+        let law = LinearLaw::pid(&pid, Controlled::Displacement, PERIOD).unwrap();
+        for omega in [1.0, 40.0, 300.0] {
+            let s = Complex::new(0.0, omega);
+            let found = law.channels[0].continuous.evaluate(s).unwrap()[(0, 0)];
+            let expected = pid.proportional + pid.integral / (s + pid.integral_leak);
+            assert!((found / expected - 1.0).norm() < 1e-12, "{omega} rad/s");
+        }
+        let told = |pid: &Pid, period| {
+            let law = LinearLaw::pid(pid, Controlled::Displacement, period);
+            law.unwrap_err().to_string()
+        };
+        let derivative = Pid {
+            derivative: 1.0,
+            ..pid
+        };
+        assert!(told(&derivative, PERIOD).contains("derivative_gain"));
+        assert!(told(&pid, 0.0).contains("period"));
+    }
+}

@@ -517,4 +517,26 @@ mod tests {
         let error = shaped.design(2000.0).unwrap_err().to_string();
         assert!(error.contains("no controller crosses at 2000"), "{error}");
     }
+
+    /// A dead time takes of what a loop can bear, the more the longer it is against the crossover.
+    #[test]
+    fn measurements_that_are_later_leave_less_robustness() {
+        let rig = ShakeTable::default();
+        let gamma = |late: f64| {
+            let shaped = Shaped {
+                rig: &rig,
+                late,
+                noise: 0.0,
+                period: SAMPLING_PERIOD,
+            };
+            shaped.shape(30.0).unwrap().1
+        };
+        let found = [0.0, 0.005, 0.010, 0.020].map(gamma);
+        println!("{found:?}");
+        for pair in found.windows(2) {
+            assert!(pair[1] > 1.05 * pair[0], "{found:?}");
+        }
+        // An integrator alone bears sqrt(2), whatever it crosses at.
+        assert!(found[0] > std::f64::consts::SQRT_2);
+    }
 }

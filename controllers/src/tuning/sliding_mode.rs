@@ -267,4 +267,21 @@ mod tests {
         };
         assert!(!hierarchy.is_stable(&printed, 1.0).unwrap());
     }
+
+    #[test]
+    fn rates_are_a_tenth_of_the_crossover_of_the_force_loop_with_its_share_of_the_valve() {
+        let rig = Rig::default();
+        let force = Pid::equation_3_7();
+        for share in [1.0, 0.5, 0.25] {
+            let rate = rate_by_rule(&rig, &force, share, PERIOD).unwrap();
+            let law = LinearLaw::pid(&force, Controlled::Force, PERIOD).unwrap();
+            let open = Loop::new(&rig, law).open(Time::Sampled, SEPARATION * rate);
+            assert!(
+                (share * open.norm() - 1.0).abs() < 1e-3,
+                "{share}: {rate} 1/s"
+            );
+        }
+        let none = rate_by_rule(&rig, &force, 1e-9, PERIOD).unwrap_err();
+        assert!(none.to_string().contains("the force loop has no crossover"));
+    }
 }
