@@ -136,3 +136,56 @@ pub(crate) fn played(signal: &[f64], width: f64) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_play_follows_half_its_width_behind_and_rests_when_it_turns() {
+        let signal = [0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0, -1.0];
+        let follows = [0.0, 0.0, 0.5, 1.5, 2.5, 2.5, 2.5, 2.5, 1.5, 0.5];
+        assert_eq!(played(&signal, 3.0), follows);
+        assert_eq!(played(&signal, 0.0), signal);
+        // Begun in its middle, wherever that is.
+        assert_eq!(played(&[5.0, 5.5, 6.5], 2.0), [5.0, 5.0, 5.5]);
+        assert!(played(&[], 1.0).is_empty());
+    }
+
+    #[test]
+    fn a_fault_is_told_with_its_interval_and_its_direction() {
+        for (fault, value, told) in [
+            (
+                Fault::Gain(0),
+                0.05,
+                "actuator 1 moves 5.0 ± 0.2 % more than its model",
+            ),
+            (
+                Fault::SensorGain(1),
+                -0.04,
+                "the stroke sensor of actuator 2 reads 4.0 ± 0.2 % less",
+            ),
+            (
+                Fault::Delay(1),
+                -3e-3,
+                "the command of actuator 2 arrives 3.00 ± 1.96 ms earlier",
+            ),
+            (
+                Fault::Play(0),
+                2e-3,
+                "actuator 1 has a play of 2.000 ± 1.960 mm",
+            ),
+            (
+                Fault::SensorsSwapped(0, 1),
+                0.0,
+                "the stroke sensors of actuators 1 and 2 are swapped",
+            ),
+        ] {
+            assert_eq!(fault.words(value, 1e-3), told);
+        }
+        assert_eq!(
+            Fault::CommandsSwapped(0, 2).to_string(),
+            "commands_swapped of actuator 1 and 3"
+        );
+    }
+}

@@ -269,6 +269,53 @@ const HIDDEN: [Change; 20] = [
     ("sensor_gain", &[1], |rig| rig.sensor[0] = 0.95),
 ];
 
+/// A fault of each actuator at once: neither explains what the other one does.
+#[test]
+fn a_fault_of_each_actuator_is_named_with_its_value_and_a_healthy_rig_has_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut draw = Draw(901);
+    let rig = Rig::healthy(&mut draw);
+    let model = identified(folder.path(), &rig, &mut draw);
+    let well = diagnosed(folder.path(), &model, &rig.record(&mut draw, 3, 2.5e-3));
+    assert_eq!(well.verdict, Verdict::Adequate, "{}", well.sentence);
+    let mut changed = rig.clone();
+    (changed.gain[0], changed.delay[1]) = (1.08, rig.delay[1] + 4);
+    let found = diagnosed(folder.path(), &model, &changed.record(&mut draw, 3, 2.5e-3));
+    println!("{} {:?} {:?}", found.sentence, found.before, found.after);
+    let mut effects: Vec<_> = found.effects.iter().collect();
+    effects.sort_by_key(|own| own.actuators.clone());
+    let named: Vec<_> = effects
+        .iter()
+        .map(|own| (&*own.effect, &own.actuators[..]))
+        .collect();
+    assert_eq!(
+        named,
+        [("gain", &[1][..]), ("delay", &[2][..])],
+        "{}",
+        found.sentence
+    );
+    for (own, truth) in effects.iter().zip([0.08, 4e-3]) {
+        let (value, error) = (own.value.unwrap(), own.standard_error.unwrap());
+        assert!(
+            (value - truth).abs() < 4.0 * error + 0.02 * truth,
+            "{own:?}"
+        );
+        assert!(error < 0.05 * truth, "{own:?}");
+    }
+    let worse = found.before.iter().zip(&found.after);
+    assert!(
+        worse
+            .map(|(before, after)| before / after)
+            .fold(0.0, f64::max)
+            > 3.0
+    );
+    assert!(
+        found.after.iter().all(|own| *own < 1.5),
+        "{:?}",
+        found.after
+    );
+}
+
 #[test]
 #[ignore = "four identifications and twenty diagnoses take half a minute of a core"]
 fn hidden_faults_are_named_with_their_actuator() {
