@@ -2,7 +2,6 @@
 //! driven.
 
 use std::net::{SocketAddr, TcpStream, UdpSocket};
-use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use crate::link::{Link, LinkError};
@@ -51,11 +50,6 @@ impl Client {
             message: vec![0; 8 * sizes.length],
             reply: vec![0.0; sizes.length],
         })
-    }
-
-    /// Ends every wait soon after `asked` becomes true.
-    pub fn heed(&mut self, asked: Option<&'static AtomicBool>) {
-        self.link.heed(asked);
     }
 
     /// Sends a vector: an action with what belongs to it.
