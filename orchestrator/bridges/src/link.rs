@@ -299,3 +299,133 @@ fn is_gone(error: &io::Error) -> bool {
         BrokenPipe | ConnectionAborted | ConnectionReset
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpListener;
+
+    use super::*;
+
+    const LIMIT: Duration = Duration::from_millis(20);
+
+    /// Both ends of a connection over TCP.
+    fn connected() -> (Link, TcpStream) {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        let peer = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let (own, _) = listener.accept().unwrap();
+        (Link::tcp(own, LIMIT).unwrap(), peer)
+    }
+
+    fn socket() -> (UdpSocket, SocketAddr) {
+        let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+        let address = socket.local_addr().unwrap();
+        socket
+            .set_read_timeout(Some(Duration::from_secs(5)))
+            .unwrap();
+        (socket, address)
+    }
+
+    #[test]
+    fn what_is_missing_of_a_message_is_told() {
+        let (mut link, mut peer) = connected();
+        let mut message = [0; 8];
+        peer.write_all(&[1, 2, 3, 4, 5, 6, 7, 8, 9]).unwrap();
+        link.receive(&mut message).unwrap();
+        assert_eq!(message, [1, 2, 3, 4, 5, 6, 7, 8]);
+        let silent = link.receive(&mut message);
+        assert!(
+            matches!(silent, Err(LinkError::Silent { got: 1, expected: 8, limit_s }) if limit_s == 0.02),
+            "{silent:?}"
+        );
+        peer.write_all(&[1, 2]).unwrap();
+        drop(peer);
+        let half = link.receive(&mut message);
+        assert!(
+            matches!(
+                half,
+                Err(LinkError::Half {
+                    got: 2,
+                    expected: 8
+                })
+            ),
+            "{half:?}"
+        );
+        let closed = link.receive(&mut message);
+        assert!(matches!(closed, Err(LinkError::Closed)), "{closed:?}");
+    }
+
+    #[test]
+    fn a_wait_ends_where_that_is_asked_for() {
+        static ASKED: AtomicBool = AtomicBool::new(true);
+        let (mut link, _peer) = connected();
+        link.limit(Duration::from_secs(60)).unwrap();
+        link.heed(Some(&ASKED));
+        let begun = Instant::now();
+        let ended = link.receive(&mut [0; 8]);
+        assert!(matches!(ended, Err(LinkError::Interrupted)), "{ended:?}");
+        assert!(begun.elapsed() < Duration::from_secs(10));
+    }
+
+    #[test]
+    fn a_long_message_goes_in_pieces_and_is_put_together() {
+        let ((one, its), (other, to)) = (socket(), socket());
+        let mut link = Link::udp(one, to, &[], "", LIMIT).unwrap();
+        let long: Vec<u8> = (0..20_000_u32).map(|n| (n % 251) as u8).collect();
+        link.send(&long).unwrap();
+        let mut got = vec![0; 1 << 16];
+        for expected in [DATAGRAM, DATAGRAM, 20_000 - 2 * DATAGRAM] {
+            assert_eq!(other.recv(&mut got).unwrap(), expected);
+        }
+        let mut back = Link::udp(other, its, &long[..5000], "", LIMIT).unwrap();
+        link.send(&long[5000..]).unwrap();
+        let mut message = vec![0; 20_000];
+        back.receive(&mut message).unwrap();
+        assert!(message == long);
+        // What is longer than a message is not the next one.
+        link.send(&[7; 12]).unwrap();
+        let long = back.receive(&mut message[..8]);
+        assert!(
+            matches!(
+                long,
+                Err(LinkError::TooLong {
+                    got: 4,
+                    expected: 8
+                })
+            ),
+            "{long:?}"
+        );
+    }
+
+    #[test]
+    fn datagrams_of_others_are_answered_with_a_word_and_announcements_are_skipped() {
+        let ((one, its), (peer, of_peer), (stranger, _)) = (socket(), socket(), socket());
+        let mut link = Link::udp(one, of_peer, &[], "busy", LIMIT).unwrap();
+        stranger.send_to(&[9; 8], its).unwrap();
+        peer.send_to(&[0; SHORTEST - 1], its).unwrap();
+        peer.send_to(&[5; 8], its).unwrap();
+        let mut message = [0; 8];
+        link.receive(&mut message).unwrap();
+        assert_eq!(message, [5; 8]);
+        let mut word = [0; 16];
+        let count = stranger.recv(&mut word).unwrap();
+        assert_eq!(&word[..count], b"busy");
+    }
+
+    #[test]
+    fn a_peer_that_is_gone_is_told_from_other_failures() {
+        use io::ErrorKind::{AddrInUse, BrokenPipe, ConnectionReset, PermissionDenied};
+        for (kind, expected) in [
+            (BrokenPipe, true),
+            (ConnectionReset, true),
+            (PermissionDenied, false),
+            (AddrInUse, false),
+        ] {
+            assert_eq!(is_gone(&kind.into()), expected, "{kind}");
+        }
+        // Without leave nothing goes to everybody.
+        let nowhere = SocketAddr::from(([255, 255, 255, 255], 9));
+        let mut link = Link::udp(socket().0, nowhere, &[], "", LIMIT).unwrap();
+        let failed = link.send(&[1]);
+        assert!(matches!(failed, Err(LinkError::Failed(_))), "{failed:?}");
+    }
+}

@@ -490,3 +490,29 @@ pub const CARRIED: &str = "model.py";
 pub fn model_of(name: &str) -> Option<&Path> {
     name.strip_prefix(PREFIX).map(Path::new)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_lines_of_a_process_are_kept_without_its_greetings() {
+        let kept = Mutex::default();
+        let said = "now running\n\n  first  \nWARNING Can't revert to last commit - x\nsecond\n";
+        keep_lines(said.as_bytes(), &kept);
+        assert_eq!(*kept.lock().unwrap(), ["first", "second"]);
+        let more: String = (0..QUOTED).map(|n| format!("{n}\n")).collect();
+        keep_lines(more.as_bytes(), &kept);
+        let expected: Vec<String> = (0..QUOTED).map(|n| n.to_string()).collect();
+        assert_eq!(*kept.lock().unwrap(), expected);
+    }
+
+    #[test]
+    fn a_model_is_named_behind_its_prefix() {
+        assert_eq!(
+            model_of("opensees:frames/one.py"),
+            Some(Path::new("frames/one.py"))
+        );
+        assert_eq!(model_of("one.py"), None);
+    }
+}
