@@ -327,6 +327,17 @@ fn faults_of_references_are_named() {
     };
     let fits = reference(&sine_reference(0.002, 1000, 1.707), &options).unwrap();
     assert!(fits.peak_displacement() < 1.5 * INCH);
+    // The scale that fits is that of the file, whatever scale was asked for.
+    let twice = Options {
+        scaling: Some(Scaling::Factor(2.0)),
+        ..options
+    };
+    let error = reference(&sine_reference(0.002, 1000, 1.707), &twice).unwrap_err();
+    let told = error.to_string();
+    assert!(
+        told.contains("3.414 in exceeds") && told.ends_with("(--scale 0.8787)"),
+        "{told}"
+    );
 }
 
 proptest::proptest! {
