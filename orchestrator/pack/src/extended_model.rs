@@ -253,3 +253,147 @@ fn law_section(law: &ControlLaw) -> toml::Table {
     }
     section
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use identification::diagnosis::engine::ParameterEstimate;
+
+    const NOISE: [f64; 4] = [1e-5, 0.04, 1.3, 0.025];
+
+    fn law() -> ControlLaw {
+        ControlLaw {
+            proportional: 120.0,
+            integral: 5.0,
+            velocity_feedforward: 2.0,
+            acceleration_feedforward: 0.03,
+            velocity_feedback: 0.2,
+            acceleration_feedback: 0.004,
+            velocity_filter: 0.5,
+            limit: 10.0,
+        }
+    }
+
+    /// A rig whose delay is known.
+    fn nominal() -> Nominal {
+        let mut own = Nominal {
+            sample_rate: 500.0,
+            shake_table: ShakeTable::default(),
+            specimen: Some(LinearSpecimen::default()),
+            controller: Some(law()),
+            noise: NOISE,
+            command_noise: 1e-3,
+            uncertainty: 0.02,
+            effects: Default::default(),
+            sensors: Default::default(),
+        };
+        own.effects.valve.command_delay = 3.3e-3;
+        own
+    }
+
+    /// What a diagnosis found: a heavier table, and a dead band of the valve.
+    fn found() -> ExtendedModel {
+        let mut model = Estimated::known(&nominal());
+        model.shake_table.table.mass *= 1.1;
+        model.effects.valve.dead_band = 0.1;
+        let error = 0.01 * model.shake_table.table.mass;
+        model.standard_errors.insert("table.mass".into(), error);
+        let named = NamedEffect {
+            effect: "valve_dead_band",
+            parameters: vec![ParameterEstimate {
+                name: "half_width".into(),
+                value: 0.1,
+                unit: "V",
+                standard_error: 2e-3,
+                is_shape: false,
+            }],
+            confidence: 0.99,
+        };
+        ExtendedModel::new(&model, &[named])
+    }
+
+    fn close(found: f64, expected: f64) -> bool {
+        (found - expected).abs() <= 1e-9 * expected.abs()
+    }
+
+    #[test]
+    fn a_model_file_is_the_nominal_model_of_the_next_diagnosis() {
+        let before = nominal();
+        let text = found().beside(&before).toml().unwrap();
+        let read = Nominal::parse(&text).unwrap();
+        let rig = |own: &Nominal| NominalRig {
+            shake_table: own.shake_table,
+            specimen: own.specimen,
+        };
+        let (all, known) = (rig(&read), rig(&before));
+        for ((parameter, value), (_, before)) in all.parameters().zip(known.parameters()) {
+            let factor = if parameter.name == "table.mass" {
+                1.1
+            } else {
+                1.0
+            };
+            assert!(close(value, factor * before), "{}: {value}", parameter.name);
+        }
+        assert!(close(read.effects.valve.dead_band, 0.1));
+        assert!(close(read.effects.valve.command_delay, 3.3e-3));
+        assert_eq!((read.sample_rate, read.uncertainty), (500.0, 0.02));
+        for (found, expected) in read.noise.iter().zip(NOISE) {
+            assert!(close(*found, expected), "{:?}", read.noise);
+        }
+        assert!(close(read.command_noise, 1e-3));
+        let (own, expected) = (read.controller.unwrap(), law());
+        for (found, expected) in [
+            (own.proportional, expected.proportional),
+            (own.integral, expected.integral),
+            (own.velocity_feedforward, expected.velocity_feedforward),
+            (
+                own.acceleration_feedforward,
+                expected.acceleration_feedforward,
+            ),
+            (own.velocity_feedback, expected.velocity_feedback),
+            (own.acceleration_feedback, expected.acceleration_feedback),
+            (own.velocity_filter, expected.velocity_filter),
+            (own.limit, expected.limit),
+        ] {
+            assert!(close(found, expected), "{own:?}");
+        }
+        // What the diagnosis began from is there, too.
+        let described = found().beside(&before).file.described.unwrap();
+        assert!(described.standard_errors.is_none() && described.described.is_none());
+        assert!(close(1.1 * described.table.mass, found().file.table.mass));
+        assert!(
+            described
+                .effects
+                .values()
+                .all(|own| !own.contains_key("half_width"))
+        );
+    }
+
+    #[test]
+    fn estimates_have_their_errors_and_what_was_known_has_none() {
+        let model = found();
+        let of = |component: &str, name: &str| model.parameters[component][name];
+        let band = of("ShakeTable", "valve_dead_band.half_width");
+        assert_eq!((band.value, band.standard_error), (0.1, Some(2e-3)));
+        let mass = of("ShakeTable", "table_mass");
+        assert!(close(mass.standard_error.unwrap(), 0.01 * mass.value));
+        assert_eq!(of("ShakeTable", "table_stiffness").standard_error, None);
+        assert_eq!(of("Specimen", "mass").value, LinearSpecimen::default().mass);
+        let delays: Vec<f64> = model.parameters["ShakeTable"]
+            .iter()
+            .filter(|(name, own)| name.contains("delay") && own.value != 0.0)
+            .map(|(_, own)| own.value)
+            .collect();
+        assert_eq!(delays, [3.3e-3]);
+        // The file has them where the parameters are.
+        let errors = model.file.standard_errors.as_ref().unwrap();
+        assert_eq!(errors.effects["valve_dead_band"]["half_width"], 2e-3);
+        assert!(close(errors.table.mass, 0.01 * model.file.table.mass));
+        assert_eq!(errors.table.stiffness, 0.0);
+        let actuator = errors.actuator.as_ref().unwrap();
+        assert!(actuator.denominator.iter().all(|error| *error == 0.0));
+        // Effects that are not on are not in the model.
+        let sections: Vec<&String> = model.file.effects.keys().collect();
+        assert_eq!(sections.len(), 2, "{sections:?}");
+    }
+}
