@@ -207,15 +207,25 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
         (own.noise.acceleration / own.noise.displacement).sqrt() / std::f64::consts::TAU
     });
     let prepared = prepare(&plan.request)?;
-    let wanted = prepared.motion.clone();
-    let late = (delay / wanted.dt).round() as usize;
-    let mut drive = first_drive(plan, &wanted)?;
+    let late = (delay / prepared.motion.dt).round() as usize;
+    let drive = first_drive(plan, &prepared.motion)?;
     let inverses = find_inverses(plan, late, crossover)?;
-    let inverse = &inverses[0];
     progress(1);
+    correct(plan, &prepared, drive, &inverses, late, progress)
+}
 
+/// Plays `drive`, corrects it by the inverse of each axis, and plays again; measurements are `late` samples late.
+fn correct(
+    plan: &Plan,
+    prepared: &Prepared,
+    mut drive: Motion,
+    inverses: &[Inverse],
+    late: usize,
+    progress: &mut dyn FnMut(usize),
+) -> Result<Iteration, Error> {
+    let (wanted, inverse) = (&prepared.motion, &inverses[0]);
     let energy = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>();
-    let asked: Vec<&Motion> = std::iter::once(&wanted)
+    let asked: Vec<&Motion> = std::iter::once(wanted)
         .chain(wanted.across.as_deref())
         .collect();
     let whole: f64 = asked.iter().map(|own| energy(&own.acceleration)).sum();
@@ -225,7 +235,7 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
     let mut first_error = Vec::new();
     let stop = loop {
         let iteration = runs.len();
-        let played = play(&prepared, drive.clone(), late)?;
+        let played = play(prepared, drive.clone(), late)?;
         progress(2 + iteration);
         let moved = played.axes.iter().map(|own| energy(&own.acceleration));
         exposure += moved.sum::<f64>() / whole;
@@ -311,7 +321,7 @@ pub fn iterate(plan: &Plan, progress: &mut dyn FnMut(usize)) -> Result<Iteration
         drive = nearest.drive.clone();
         inverse.correct(&mut drive, &nearest.errors[0], gain);
         if let (Some(across), [_, inverse], [_, error]) =
-            (&mut drive.across, &inverses[..], &nearest.errors[..])
+            (&mut drive.across, inverses, &nearest.errors[..])
         {
             inverse.correct(across, error, gain);
         }
@@ -643,5 +653,136 @@ mod tests {
             ([vec![1.0], vec![2.0]], Some([vec![3.0], vec![4.0]]))
         );
         assert!(seen(&table, &[], &record).unwrap().1.is_none());
+    }
+
+    /// Corrections on a rig that follows with nine tenths, by an inverse that is exact: every one leaves the same part
+    /// of the error.
+    fn corrected(own: Plan, table: fn(&[f64], &mut [f64])) -> (Iteration, usize) {
+        let wanted = motion::built_in(FINDING_SEED, &motion::Options::default()).unwrap();
+        let answer = |history: &[f64]| history.iter().map(|value| 0.9 * value).collect();
+        let answer = Measured {
+            displacement: answer(&wanted.displacement),
+            acceleration: answer(&wanted.acceleration),
+        };
+        let inverse = Inverse::exact(&wanted, &answer, USUAL_CROSSOVER, own.band);
+        let prepared = made::prepared(wanted.clone(), table);
+        let mut last = 0;
+        let mut progress = |runs| last = runs;
+        let found = correct(&own, &prepared, wanted, &[inverse], 0, &mut progress).unwrap();
+        (found, last)
+    }
+
+    fn measured(found: &Iteration) -> Vec<f64> {
+        let all = found.runs.iter().map(|run| run.measured_percent.unwrap());
+        all.collect()
+    }
+
+    #[test]
+    fn every_correction_leaves_the_part_that_its_gain_does_not_take() {
+        let half = Plan {
+            gain: 0.5,
+            target_percent: 0.0,
+            ..plan(None, None)
+        };
+        let (found, runs) = corrected(half.clone(), made::follows);
+        assert_eq!((found.stop, found.best, runs), (Stop::Iterations, 3, 5));
+        assert!(found.converges && found.coherence == 0.0);
+        let errors = measured(&found);
+        for (n, error) in errors.iter().enumerate() {
+            let expected = errors[0] * 0.5_f64.powi(n as i32);
+            assert!((error / expected - 1.0).abs() < 0.05, "{errors:?}");
+        }
+        // Energies of 0.9, 0.95, 0.975 and 0.9875 of the motion, one run after the other.
+        let sizes = [0.9_f64, 0.95, 0.975, 0.9875];
+        let mut exposure = 0.0;
+        for (run, size) in found.runs.iter().zip(sizes) {
+            exposure += size * size;
+            assert!((run.exposure / exposure - 1.0).abs() < 0.01, "{run:?}");
+            assert_eq!(run.gain, if run.iteration == 0 { 0.0 } else { 0.5 });
+            assert_eq!((run.ended, &run.ended_because), (Ending::Complete, &None));
+        }
+        let (dt, first, off) = found.errors.unwrap();
+        let wanted = motion::built_in(FINDING_SEED, &motion::Options::default()).unwrap();
+        assert_eq!((dt, first.len()), (wanted.dt, wanted.len()));
+        // A tenth is missing, and the table is a sample late.
+        let share = rms(&first) / rms(&wanted.acceleration);
+        assert!((share - 0.1).abs() < 0.05, "{share}");
+        let both = first.iter().zip(&wanted.acceleration);
+        assert!(both.map(|(off, wanted)| off * wanted).sum::<f64>() < 0.0);
+        assert!(rms(&off) < 0.2 * rms(&first));
+
+        // The same ends where the error is small enough, or the specimen has seen enough.
+        let (found, _) = corrected(
+            Plan {
+                target_percent: 1.1 * errors[2],
+                ..half.clone()
+            },
+            made::follows,
+        );
+        assert_eq!((found.stop, found.runs.len()), (Stop::Target, 3));
+        let (found, _) = corrected(
+            Plan {
+                exposure: Some(2.0),
+                ..half
+            },
+            made::follows,
+        );
+        assert_eq!((found.stop, found.runs.len()), (Stop::Exposure, 2));
+    }
+
+    #[test]
+    fn corrections_that_are_too_large_are_halved_once_and_the_best_drive_is_kept() {
+        let of = |gain: f64| Plan {
+            gain,
+            target_percent: 0.0,
+            ..plan(None, None)
+        };
+        // Three times the inverse turns the error round at twice its size, half of it at half.
+        let (found, _) = corrected(of(3.0), made::follows);
+        let gains: Vec<f64> = found.runs.iter().map(|run| run.gain).collect();
+        assert_eq!(gains, [0.0, 3.0, 1.5, 1.5]);
+        let errors = measured(&found);
+        for (n, part) in [1.0, 2.0, 0.5, 0.25].into_iter().enumerate() {
+            assert!(
+                (errors[n] / errors[0] / part - 1.0).abs() < 0.1,
+                "{errors:?}"
+            );
+        }
+        assert_eq!((found.stop, found.best), (Stop::Iterations, 3));
+        // Five times: the half of it is too large as well.
+        let (found, _) = corrected(of(5.0), made::follows);
+        assert_eq!(
+            (found.stop, found.best, found.runs.len()),
+            (Stop::Diverges, 0, 3)
+        );
+        assert!(!found.converges);
+        let drive = found.drive.unwrap();
+        assert_eq!(
+            drive.acceleration,
+            motion::built_in(FINDING_SEED, &motion::Options::default())
+                .unwrap()
+                .acceleration
+        );
+        // A table that does not move is not corrected.
+        let (found, _) = corrected(of(1.0), |_, outputs| outputs.fill(0.0));
+        assert_eq!(
+            (found.stop, found.best, found.runs.len()),
+            (Stop::Stalled, 0, 2)
+        );
+    }
+
+    #[test]
+    fn a_run_that_ends_early_ends_the_iteration_without_a_figure() {
+        let (found, runs) = corrected(plan(None, None), |_, outputs| outputs.fill(f64::NAN));
+        assert_eq!(
+            (found.stop, runs, found.converges),
+            (Stop::EndedEarly, 2, false)
+        );
+        assert!(found.drive.is_none() && found.errors.is_none());
+        let [run] = &found.runs[..] else {
+            panic!("{:?}", found.runs)
+        };
+        assert_eq!((run.measured_percent, run.ended), (None, Ending::Failed));
+        assert!(run.ended_because.is_some());
     }
 }
