@@ -9,6 +9,8 @@ mod poles;
 mod residuals;
 mod responses;
 mod summary;
+#[cfg(test)]
+mod tests;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
