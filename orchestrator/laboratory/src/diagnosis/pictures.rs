@@ -317,6 +317,15 @@ mod tests {
         let own = spectrum("sine", &sine, period);
         let most = (0..own.values.len()).max_by(|a, b| own.values[*a].total_cmp(&own.values[*b]));
         assert!((places(&own)[most.unwrap()] - 5.0).abs() < 1e-9);
+        // All of the record counts: what sounds in its last tenth alone has a tenth of the power.
+        let mut late = sine.clone();
+        late[..1800].fill(0.0);
+        let power = |values: &[f64]| -> f64 {
+            let own = spectrum("sine", values, period).values;
+            own.iter().map(|value| value * value).sum()
+        };
+        let part = power(&late) / power(&sine);
+        assert!((part - 0.1).abs() < 0.03, "{part}");
         assert!(
             spectrum("short", &[1.0, 2.0], period)
                 .values
@@ -335,5 +344,66 @@ mod tests {
         assert!(all.iter().all(|own| !own.contains('_')));
         let names = [0, 1, 2, 3].map(|n| units(n).si.to_string());
         assert_eq!(names, ["mm", "g", "kN", "g"]);
+    }
+
+    #[test]
+    fn readings_of_both_rigs_are_shown_over_and_less_what_was_measured() {
+        let text = include_str!("../../systems/plant/servohydraulic-model.toml");
+        let mut nominal = identification::diagnosis::case::Nominal::parse(text).unwrap();
+        nominal.sample_rate = 250.0;
+        let measured = [1e-3, 3e-3, -2e-3];
+        let channels = vec![
+            (Channel::ValveCommand, vec![0.0; 3]),
+            (Channel::Displacement, measured.to_vec()),
+            (Channel::ActuatorForce, vec![5.0; 3]),
+        ];
+        let record = identification::data::Recording::new("v", 0.004, channels).unwrap();
+        let case = Case {
+            nominal,
+            identification: record.clone(),
+            validation: record,
+            small: None,
+            baseline: None,
+        };
+        let played = |part: f64| {
+            let own = |value: f64| vec![part * value; 3];
+            [own(1e-3), own(9.0), own(4.0), own(9.0)]
+        };
+        let gain = serde_json::json!({
+            "before_nrmse": 0.5, "after_nrmse": 0.1, "noise_floor_nrmse": 0.04, "interval_95": [0.6, 0.9],
+            "record": "validation", "before_ratio": 5.0, "after_ratio": 1.25, "channels": {},
+        });
+        let found = Comparison {
+            before: played(1.0),
+            after: played(2.0),
+            floor: [1e-5, 9.0, 0.25, 9.0],
+            gain: serde_json::from_value(gain).unwrap(),
+        };
+        // Channels that were not recorded are left out.
+        let off = closed_loop(&case, &found);
+        let titles: Vec<&str> = off.iter().map(|own| &*own.title).collect();
+        let told = ["displacement", "actuator force"]
+            .map(|own| format!("{own}, measured less co-simulated"));
+        assert_eq!(titles, told);
+        let names: Vec<&str> = off[0].series.iter().map(|own| &*own.name).collect();
+        assert_eq!(
+            names,
+            ["twice the noise floor", "nominal model", "extended model"]
+        );
+        let expected = [[0.0, 2e-3, -3e-3], [-1e-3, 1e-3, -4e-3]];
+        for (series, expected) in off[0].series[1..].iter().zip(expected) {
+            for (value, expected) in series.values.iter().zip(expected) {
+                assert!((value - expected).abs() < 1e-15, "{}", series.name);
+            }
+            assert_eq!(places(series), [0.0, 0.004, 0.008]);
+        }
+        assert_eq!(places(&off[1].series[0])[1], 0.008);
+        assert_eq!(off[1].series[0].values[..3], [0.5, 0.5, -0.5]);
+        assert_eq!(off[1].series[2].values, [-3.0; 3]);
+        let over = overlays(&case, &found);
+        assert_eq!(over[1].title, "actuator force, measured and co-simulated");
+        let values = over[1].series.iter().map(|own| &own.values[..]);
+        assert_eq!(values.collect::<Vec<_>>(), [[5.0; 3], [4.0; 3], [8.0; 3]]);
+        assert_eq!(&*over[1].y.units.si, "kN");
     }
 }

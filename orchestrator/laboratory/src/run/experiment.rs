@@ -605,4 +605,99 @@ mod tests {
                 .all(|own| own.after == 0.0 && own.values.is_empty())
         );
     }
+
+    /// A system of one table, with these lines of its file, as a request prepares it.
+    fn prepared(request: &Request, lines: &str) -> Result<Prepared, Error> {
+        let mut library = FmuLibrary::new(request.fmi, None);
+        let table = crate::made::computed("Table", [&["u"], &["y"]], "", false, |_, _| {});
+        library.give("Table", table);
+        let text = format!("name = \"own\"\n{lines}\n[components.table]\nfmu = \"Table\"\n");
+        let file = SystemFile::parse("own", &text).unwrap();
+        prepare_shared(request, &file, &Mutex::new(library), &Motions::default())
+    }
+
+    #[test]
+    fn a_motion_is_played_if_anything_asks_for_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: String| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let wave = crate::made::wave("wave", 3001);
+        let [x, v, a] = [&wave.displacement, &wave.velocity, &wave.acceleration];
+        let rows = (0..wave.len()).map(|n| (n as f64 * wave.dt, n));
+        let head = "time [s],displacement [m],velocity [m/s],acceleration [m/s2]\n".to_string();
+        let all = rows
+            .clone()
+            .map(|(t, n)| format!("{t},{},{},{}\n", x[n], v[n], a[n]));
+        let moved = write("reference.csv", all.fold(head, |text, row| text + &row));
+        let head = "time [s],acceleration [m/s2]\n".to_string();
+        let ground = rows.map(|(t, n)| format!("{t},{}\n", a[n]));
+        let shaken = write("record.csv", ground.fold(head, |text, row| text + &row));
+        let quiet = Request {
+            duration_s: Some(1.0),
+            ..Request::built_in("own.toml")
+        };
+        let played = |request: &Request, lines: &str| prepared(request, lines).unwrap();
+        // At rest there is a row at the end, too.
+        let rest = played(&quiet, "");
+        assert!(rest.motion.is_empty());
+        assert_eq!((rest.motion.dt, rest.samples), (USUAL_STEP, 501));
+        let record = Request {
+            record: Some(shaken.clone()),
+            ..quiet.clone()
+        };
+        let reference = Request {
+            reference: Some(moved.clone()),
+            ..quiet.clone()
+        };
+        let by_file = |key: &str, path: &Path| {
+            format!("[experiment]\n{key} = {:?}", path.display().to_string())
+        };
+        for own in [
+            played(&record, ""),
+            played(&reference, ""),
+            played(&quiet, &by_file("record", &shaken)),
+            played(&quiet, &by_file("reference", &moved)),
+            played(
+                &quiet,
+                "connections = [\"reference.displacement -> table.u\"]",
+            ),
+        ] {
+            assert!(!own.motion.is_empty());
+            assert_eq!((own.samples, own.step), (500, own.motion.dt));
+        }
+        let twice = played(&reference, "");
+        assert!((twice.motion.displacement[100] - wave.displacement[100]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_run_longer_than_its_motion_rests_at_the_end_and_says_so() {
+        let follows = "connections = [\"reference.displacement -> table.u\"]";
+        let request = |duration: f64| Request {
+            duration_s: Some(duration),
+            ..Request::built_in("own.toml")
+        };
+        let whole = prepared(&Request::built_in("own.toml"), follows).unwrap();
+        let (count, ends) = (whole.samples, whole.samples as f64 * whole.motion.dt);
+        assert!(whole.system.notes.is_empty());
+        for (more, means) in [(0.5, false), (10.0, true)] {
+            let own = prepared(&request(ends + more), follows).unwrap();
+            let expected = count + (more / own.motion.dt).round() as usize;
+            assert_eq!((own.samples, own.motion.len()), (expected, expected));
+            let [note] = &own.system.notes[..] else {
+                panic!("{:?}", own.system.notes)
+            };
+            assert!(note.contains(&format!("ends at {ends:.3} s")), "{note}");
+            assert_eq!(note.contains("not in the means of errors"), means, "{note}");
+        }
+        let told = |duration: f64| {
+            let error = prepared(&request(duration), follows).err();
+            error.unwrap().to_string()
+        };
+        assert!(told(0.001).contains("0.001 s is shorter than a sample of 0.002 s"));
+        assert!(told(1e9).contains("needs 5e11 samples"));
+        assert!(told(f64::INFINITY).contains("--duration"));
+    }
 }

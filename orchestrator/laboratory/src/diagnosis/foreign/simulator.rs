@@ -347,7 +347,7 @@ impl Simulator for Alone {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     #[test]
@@ -381,7 +381,7 @@ mod tests {
     }
 
     /// `y = 3 u` at the end of each step.
-    fn alone() -> Alone {
+    pub(in crate::diagnosis::foreign) fn alone() -> Alone {
         use crate::made;
         let gain = made::real(1, "gain", "parameter", r#"variability="fixed" start="1""#);
         let fmu = made::computed("Gain", [&["u"], &["y"]], &gain, false, |inputs, outputs| {

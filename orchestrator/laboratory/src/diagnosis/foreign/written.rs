@@ -230,7 +230,11 @@ pub(super) fn traces(
 
 #[cfg(test)]
 mod tests {
+    use identification::diagnosis::rigs::foreign::{Extension, Parameter, Trial};
+
+    use super::super::simulator;
     use super::*;
+    use fmi_system::{Setting, SystemFile};
 
     fn signal(name: &str, unit: &str) -> Signal {
         Signal {
@@ -265,5 +269,92 @@ mod tests {
         );
         let none = toml::to_string(&path(&SignalEffects::NONE, 0.002)).unwrap();
         assert!(none.ends_with("[parameters]\nperiod = 0.002\n"), "{none}");
+    }
+
+    /// The extended model of `y = 3 u` with these effects on its input and its output.
+    fn extended(inputs: SignalEffects, outputs: SignalEffects) -> SystemFile {
+        let alone = simulator::tests::alone();
+        let trial = |name: &str, left_out: [bool; 4]| Trial {
+            name: name.into(),
+            step: 0.01,
+            stride: 5,
+            inputs: vec![vec![0.0; 16]],
+            outputs: vec![vec![0.0; 4]],
+            left_out: left_out.to_vec(),
+        };
+        let subject = ForeignModel {
+            name: "gain".into(),
+            simulator: &alone,
+            inputs: vec![signal("u", "V")],
+            outputs: vec![signal("y", "m")],
+            parameters: vec![Parameter {
+                name: "gain".into(),
+                unit: String::new(),
+                value: 1.0,
+                plus_minus: 0.1,
+            }],
+            trials: vec![
+                trial("fitted", [false; 4]),
+                trial("held out", [false, false, true, true]),
+            ],
+        };
+        let found = ForeignDiagnosis {
+            found: crate::made::rig_diagnosis("fmu"),
+            equivalents: Vec::new(),
+            notes: Vec::new(),
+            extension: Extension {
+                inputs: vec![inputs],
+                outputs: vec![outputs],
+                parameters: vec![(0, 1.25)],
+            },
+            nominal: Vec::new(),
+            extended: Vec::new(),
+            predictable: 0.0,
+        };
+        assert_eq!(shown(&subject), 1);
+        let text = system(&alone, Path::new("Gain"), &subject, &found).unwrap();
+        assert!(text.starts_with("# gain with the effects around it, on the record held out."));
+        SystemFile::parse("extended", &text).unwrap()
+    }
+
+    fn links(file: &SystemFile) -> Vec<String> {
+        file.connections.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn an_extended_model_has_paths_where_there_are_effects_and_only_there() {
+        let late = SignalEffects {
+            delay: 0.02,
+            ..SignalEffects::NONE
+        };
+        let bare = extended(SignalEffects::NONE, SignalEffects::NONE);
+        assert_eq!(links(&bare), ["record.u -> own.u"]);
+        let names: Vec<&String> = bare.components.keys().collect();
+        assert_eq!(names, ["own"]);
+        assert_eq!(
+            bare.components["own"].parameters["gain"],
+            Setting::Number(1.25)
+        );
+        // Three samples of five steps.
+        assert_eq!(bare.duration().unwrap(), Some(15.0 * 0.01));
+        assert_eq!(bare.step().unwrap(), Some(0.01));
+        let before = extended(late, SignalEffects::NONE);
+        assert_eq!(
+            links(&before),
+            ["record.u -> u_path.u", "u_path.y -> own.u"]
+        );
+        let path = &before.components["u_path"];
+        assert_eq!(
+            (&*path.fmu, &path.parameters["delay"]),
+            (PATH, &Setting::Number(0.02))
+        );
+        assert_eq!(path.parameters["period"], Setting::Number(0.01));
+        let behind = extended(SignalEffects::NONE, late);
+        assert_eq!(links(&behind), ["record.u -> own.u", "own.y -> y_path.u"]);
+        // Outputs are sampled as they were measured.
+        assert_eq!(
+            behind.components["y_path"].parameters["period"],
+            Setting::Number(0.05)
+        );
     }
 }
