@@ -77,3 +77,55 @@ impl Rules {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::control_model::ControlModel;
+    use super::*;
+    use fmi_system::ComponentFile;
+
+    /// The parameters of the variant of that name.
+    fn tuned(variant: &str) -> ComponentFile {
+        let mut component = ComponentFile::default();
+        component.set("variant", Setting::Text(variant.into()));
+        let own = &mut Tuned {
+            name: "control",
+            component: &mut component,
+            connections: &mut [],
+            specimen: None,
+        };
+        let model = ControlModel::commissioned().unwrap();
+        Rules::unprinted(model).surface_control(own).unwrap();
+        component
+    }
+
+    fn number(own: &ComponentFile, name: &str) -> f64 {
+        match own.parameters.get(name) {
+            Some(Setting::Number(value)) => *value,
+            Some(Setting::Integer(value)) => *value as f64,
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn every_surface_is_twice_as_quick_as_the_one_around_it() {
+        for variant in ["multiple-surface", "dynamic-surface", "receding-horizon"] {
+            let own = tuned(variant);
+            let of = |name: &str| number(&own, name);
+            let rate = of("surface_rate");
+            for (name, times) in [
+                ("motion_reaching_rate", 1.0),
+                ("oil_reaching_rate", 2.0),
+                ("spool_reaching_rate", 4.0),
+            ] {
+                assert!((of(name) / rate - times).abs() < 1e-9, "{variant}: {name}");
+            }
+            // The horizon's rate is given, and its moves are weighed; the others' is the best that was tried.
+            let is_horizon = variant == "receding-horizon";
+            assert_eq!(rate == 20.0, is_horizon);
+            assert!((15.0..=90.0).contains(&rate));
+            let usual = Parameters::default().move_weight;
+            assert_eq!(of("move_weight") != usual, is_horizon);
+        }
+    }
+}

@@ -488,6 +488,7 @@ fn preview_control(model: &ControlModel) -> preview::Parameters {
 
 #[cfg(test)]
 mod tests {
+    use super::super::built_in;
     use super::*;
     use plant::identified::valve_curve::ValveCurve;
 
@@ -515,5 +516,45 @@ mod tests {
             ..ValveCurve::default()
         };
         assert!(step(Some(lapped)) >= 4.0 * step(None));
+    }
+
+    /// What a rule puts on a controller is the model: its table, its noise, its delay.
+    #[test]
+    fn every_rule_tells_its_controller_of_the_model() {
+        let model = ControlModel::commissioned().unwrap();
+        let known = [
+            (vocabulary::TABLE_MASS, model.rig.table.mass),
+            (vocabulary::MEASUREMENT_NOISE[0], model.noise.displacement),
+            (vocabulary::MEASUREMENT_NOISE[1], model.noise.velocity),
+            (vocabulary::MEASUREMENT_NOISE[2], model.noise.acceleration),
+            (vocabulary::LOOP_DELAY_SAMPLES, model.delay as f64),
+        ];
+        for part in catalogue::CONTROLLERS {
+            let printed = SystemFile::parse(part.name, part.text).unwrap();
+            let wanted = Wanted::default();
+            let file = built_in::system(part.name, "servohydraulic", "yielding", wanted).unwrap();
+            for (name, own) in &file.components {
+                let Some(rule) = own.tuning.as_deref() else {
+                    continue;
+                };
+                let Some(before) = printed.components.get(name) else {
+                    continue;
+                };
+                assert_ne!(own.parameters, before.parameters, "{}: {rule}", part.name);
+                for (parameter, expected) in known {
+                    let value = match own.parameters.get(parameter) {
+                        Some(Setting::Number(value)) => *value,
+                        Some(Setting::Integer(value)) => *value as f64,
+                        _ => continue,
+                    };
+                    // The masses of both forms of the model differ a little.
+                    assert!(
+                        (value / expected - 1.0).abs() < 0.005,
+                        "{}: {rule}: {parameter} = {value}, expected {expected}",
+                        part.name
+                    );
+                }
+            }
+        }
     }
 }
