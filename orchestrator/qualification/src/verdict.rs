@@ -176,4 +176,46 @@ mod tests {
         };
         assert!(!fits(&strict, &[point(0.99)]));
     }
+
+    /// A sine of 4 Hz: an oscillator that is much stiffer moves with it, one in resonance much more.
+    #[test]
+    fn a_verdict_has_the_extremes_of_the_ratios_and_scales_with_the_record() {
+        let rule = Rule::ac156(1.0, 0.0, false);
+        let (dt, peak) = (0.001, 3.0);
+        let at = |n: u32| peak * (8.0 * std::f64::consts::PI * f64::from(n) * dt).sin();
+        let sine: Vec<f64> = (0..5000).map(at).collect();
+        let of = |factor: f64| {
+            let scaled: Vec<f64> = sine.iter().map(|a| factor * a).collect();
+            Verdict::new(&rule, &scaled, dt, vec!["doubt".into()])
+        };
+        let own = of(1.0);
+        let all: Vec<f64> = own.points.iter().map(Ratio::ratio).collect();
+        let resonance = (0..all.len())
+            .max_by(|a, b| all[*a].total_cmp(&all[*b]))
+            .unwrap();
+        assert!((own.points[resonance].frequency_hz - 4.0).abs() < 0.3);
+        assert_eq!(own.highest_ratio, all[resonance]);
+        assert!(
+            all.iter().all(|ratio| *ratio >= own.lowest_ratio) && all.contains(&own.lowest_ratio)
+        );
+        assert_eq!(own.warnings, ["doubt"]);
+        let stiff = own.points.last().unwrap().trs_g * STANDARD_GRAVITY;
+        assert!((stiff / peak - 1.0).abs() < 0.1, "{stiff}");
+        let rigid = peak / STANDARD_GRAVITY / rule.required(rule.band_hz[1]);
+        assert!((own.peak_over_rigid / rigid - 1.0).abs() < 1e-3);
+        let [low, high] = own.twelfth_octaves;
+        assert!(low <= own.lowest_ratio && high >= 0.9 * own.highest_ratio);
+        // As large as the weakest point needs, and half of that.
+        let enough = of(1.000_001 / own.lowest_ratio);
+        assert!((enough.lowest_ratio - 1.0).abs() < 1e-5);
+        assert_eq!((enough.below_1, enough.envelops()), (0, true));
+        let little = of(0.5 / own.lowest_ratio);
+        assert_eq!(little.verdict, "falls short");
+        let below = all
+            .iter()
+            .filter(|ratio| **ratio < 2.0 * own.lowest_ratio)
+            .count();
+        assert_eq!(little.below_1, below);
+        assert_eq!(extremes(&[]), [f64::INFINITY, 0.0]);
+    }
 }
