@@ -312,3 +312,104 @@ fn is_stirred(band: &Band) -> bool {
     const RATIO: f64 = 16.0;
     band.projected(0).norm_sqr() > RATIO * band.noise[(0, 0)].re
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 0.005;
+
+    /// Noise from -1 to 1.
+    fn noise(samples: usize, seed: u32) -> Vec<f64> {
+        let mut state = seed;
+        let next = |_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+        };
+        (0..samples).map(next).collect()
+    }
+
+    /// `y = 0.6 r[k] + 0.3 r[k - 1]`.
+    fn answer(reference: &[f64]) -> Vec<f64> {
+        let before = |k: usize| if k > 0 { reference[k - 1] } else { 0.0 };
+        (0..reference.len())
+            .map(|k| 0.6 * reference[k] + 0.3 * before(k))
+            .collect()
+    }
+
+    fn square(values: &[f64]) -> f64 {
+        values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
+    }
+
+    #[test]
+    fn projections_on_the_reference_have_the_response_and_the_rest_the_noise() {
+        let reference = noise(4000, 1);
+        let (clean, disturbance) = (answer(&reference), noise(4000, 9));
+        let measured: Vec<f64> = clean
+            .iter()
+            .zip(&disturbance)
+            .map(|(y, n)| y + 0.2 * n)
+            .collect();
+        let own = Bands::new(
+            "a",
+            &[&reference],
+            &[&reference, &measured],
+            PERIOD,
+            (1.0, 80.0),
+        )
+        .unwrap();
+        assert_eq!(own.period, PERIOD);
+        // From 1 to 80 Hz there are lines every 0.05 Hz, twenty a band.
+        assert_eq!(own.bands.len(), 79);
+        let (mut off, mut noises) = (Vec::new(), Vec::new());
+        for band in &own.bands {
+            let scaled = band.projected(1) * own.scale[1] / (band.projected(0) * own.scale[0]);
+            let expected = 0.6 + 0.3 * Complex::new(0.0, -band.middle() * PERIOD).exp();
+            off.push((scaled - expected).norm());
+            noises.push(band.noise[(1, 1)].re * own.scale[1] * own.scale[1]);
+            assert!((band.omega[0] / (TAU * 0.05 * band.lines.start as f64) - 1.0).abs() < 1e-9);
+        }
+        // Noise on a line over the reference's on twenty of them.
+        assert!(square(&off).sqrt() < 0.08, "{}", square(&off).sqrt());
+        // A third is the variance from -1 to 1.
+        let mean = noises.iter().sum::<f64>() / noises.len() as f64;
+        assert!((mean / (0.04 / 3.0) - 1.0).abs() < 0.1, "{mean}");
+    }
+
+    #[test]
+    fn what_the_reference_explains_is_free_of_most_of_the_noise() {
+        let reference = noise(4000, 1);
+        let (clean, disturbance) = (answer(&reference), noise(4000, 9));
+        let measured: Vec<f64> = clean
+            .iter()
+            .zip(&disturbance)
+            .map(|(y, n)| y + 0.2 * n)
+            .collect();
+        let band = (0.0, 100.0);
+        let rest = |signal: &[f64]| {
+            let found = explained(&reference, signal, PERIOD, band).unwrap();
+            let mean = clean.iter().sum::<f64>() / 4000.0;
+            let off = found.iter().zip(&clean).map(|(a, b)| a - (b - mean));
+            square(&off.collect::<Vec<_>>())
+        };
+        // Without noise what is lost is as smooth over a band as transients are: three of twenty lines.
+        let lost = rest(&clean) / square(&clean);
+        assert!((lost - 0.15).abs() < 0.04, "{lost}");
+        // Three instruments of twenty lines keep as much of the noise.
+        let kept = (rest(&measured) - rest(&clean)) / (0.04 / 3.0);
+        assert!((0.1..0.25).contains(&kept), "{kept}");
+    }
+
+    #[test]
+    fn records_that_tell_nothing_are_refused() {
+        let reference = noise(4000, 1);
+        let told = |channel: &[f64], band| {
+            let count = channel.len();
+            let found = Bands::new("a", &[&reference[..count]], &[channel], PERIOD, band);
+            found.unwrap_err().to_string()
+        };
+        let unrelated = noise(4000, 9);
+        assert!(told(&unrelated, (1.0, 80.0)).contains("the reference excites the command in "));
+        assert!(told(&reference[..100], (1.0, 10.0)).contains("a: "));
+    }
+}

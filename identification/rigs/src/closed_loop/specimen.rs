@@ -200,3 +200,149 @@ pub fn fit(
         misfit: left.sqrt() * tests.noise / size,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 0.004;
+    /// 5 % of critical damping at 2 Hz.
+    const DAMPING: f64 = 1.2566;
+    const STIFFNESS: f64 = 157.91;
+
+    #[test]
+    fn an_elastic_specimen_on_a_base_that_starts_at_once_swings_about_its_new_place() {
+        let own = SpecimenOverMass::elastic(DAMPING, STIFFNESS);
+        let size = 3.0;
+        let shown = own.carried(&[size; 500], PERIOD);
+        let (decay, omega) = (0.5 * DAMPING, (STIFFNESS - 0.25 * DAMPING * DAMPING).sqrt());
+        for (k, value) in shown.iter().enumerate() {
+            let t = k as f64 * PERIOD;
+            let (s, c) = (omega * t).sin_cos();
+            let fade = (-decay * t).exp();
+            let expected = size * (1.0 - fade * (c - decay / omega * s));
+            assert!(
+                (value - expected).abs() < 1e-6 * size,
+                "{t} s: {value} {expected}"
+            );
+        }
+        // Half a period later it is nearly twice as far.
+        let peak = shown.iter().copied().fold(0.0, f64::max);
+        assert!((1.8..2.0).contains(&(peak / size)), "{peak}");
+    }
+
+    #[test]
+    fn a_yielding_specimen_bears_little_more_than_its_yield_force() {
+        let yielding = SpecimenOverMass {
+            yield_displacement: 0.01,
+            post_ratio: 0.1,
+            exponent: 2.0,
+            ..SpecimenOverMass::elastic(0.0, STIFFNESS)
+        };
+        let elastic = SpecimenOverMass::elastic(0.0, STIFFNESS);
+        // Small drifts are elastic; on large ones only the hardening grows.
+        assert_eq!(
+            yielding.force([1e-3, 0.0, 1e-3]),
+            elastic.force([1e-3, 0.0, 1e-3])
+        );
+        let beyond = yielding.force([0.05, 0.0, 0.01]);
+        assert!((beyond / (STIFFNESS * (0.1 * 0.05 + 0.9 * 0.01)) - 1.0).abs() < 1e-12);
+        assert_eq!(yielding.hysteretic_rate(0.3, 0.01), 0.0);
+        assert!((yielding.hysteretic_rate(0.3, 0.005) / 0.225 - 1.0).abs() < 1e-12);
+        // Unloading is elastic again.
+        assert_eq!(yielding.hysteretic_rate(-0.3, 0.005), -0.3);
+    }
+
+    /// Noise from -1 to 1.
+    fn noise(samples: usize, seed: u32) -> Vec<f64> {
+        let mut state = seed;
+        let next = |_| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
+        };
+        (0..samples).map(next).collect()
+    }
+
+    /// Accelerations of a base under random motion and of the mass on it, in a hundred steps a sample.
+    fn test(own: &SpecimenOverMass, size: f64, seed: u32) -> [Vec<f64>; 2] {
+        const STEPS: usize = 100;
+        let (mut slow, mut base) = (0.0, Vec::new());
+        for value in noise(3000, seed) {
+            slow += 0.1 * (value - slow);
+            base.push(size * slow);
+        }
+        let (mut d, mut v, mut z) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let step = PERIOD / STEPS as f64;
+        let mut mass = Vec::new();
+        let force = |d: f64, v: f64, z: f64| {
+            let inner = own.post_ratio * d + (1.0 - own.post_ratio) * z;
+            own.damping * v + own.stiffness * inner
+        };
+        for k in 0..base.len() {
+            mass.push(-force(d, v, z));
+            let next = base[(k + 1).min(base.len() - 1)];
+            for i in 0..STEPS {
+                let part = (i as f64 + 0.5) / STEPS as f64;
+                v -= step * (base[k] + part * (next - base[k]) + force(d, v, z));
+                d += step * v;
+                let loads = if z * v > 0.0 { 1.0 } else { 0.0 };
+                z += step
+                    * v
+                    * (1.0 - loads * (z.abs() / own.yield_displacement).powf(own.exponent));
+            }
+        }
+        for (value, noise) in mass.iter_mut().zip(noise(3000, seed + 1)) {
+            *value += 0.02 * noise + 0.05;
+        }
+        [base, mass]
+    }
+
+    fn fitted(own: &SpecimenOverMass, size: f64) -> SpecimenFit {
+        let all = [1, 77].map(|seed| test(own, size, seed));
+        let [base, mass] = [0, 1].map(|n| all.each_ref().map(|own| &own[n][..]));
+        fit(&base, &mass, PERIOD, 2.0 * DAMPING, 0.8 * STIFFNESS).unwrap()
+    }
+
+    /// The sensor's zero, 0.05 m/s², is not the specimen's.
+    #[test]
+    fn an_elastic_specimen_is_found_with_errors_that_hold() {
+        let truth = SpecimenOverMass {
+            yield_displacement: 1e9,
+            ..SpecimenOverMass::elastic(DAMPING, STIFFNESS)
+        };
+        let found = fitted(&truth, 4.0);
+        let own = found.specimen;
+        assert!(own.yield_displacement.is_infinite(), "{own:?}");
+        let error = |n: usize| found.covariance[(n, n)].sqrt();
+        for (value, truth, error) in [
+            (own.damping, DAMPING, error(0)),
+            (own.stiffness, STIFFNESS, error(1)),
+        ] {
+            assert!(error > 0.0 && error < 0.02 * truth, "{value} ± {error}");
+            assert!(
+                (value - truth).abs() < 4.0 * error + 1e-3 * truth,
+                "{value} ± {error}"
+            );
+        }
+        assert!(found.misfit < 0.05, "{}", found.misfit);
+    }
+
+    #[test]
+    fn a_yielding_specimen_is_found_where_it_yields() {
+        let truth = SpecimenOverMass {
+            yield_displacement: 5e-3,
+            post_ratio: 0.2,
+            exponent: 2.0,
+            ..SpecimenOverMass::elastic(DAMPING, STIFFNESS)
+        };
+        let own = fitted(&truth, 12.0).specimen;
+        println!("{own:?}");
+        for (found, truth) in [
+            (own.stiffness, truth.stiffness),
+            (own.yield_displacement, truth.yield_displacement),
+            (own.post_ratio, truth.post_ratio),
+        ] {
+            assert!((found / truth - 1.0).abs() < 0.1, "{own:?}");
+        }
+    }
+}

@@ -85,3 +85,93 @@ pub fn standard_errors(
     let own = &slopes * covariance * slopes.transpose();
     Some(std::array::from_fn(|i| own[(i, i)].max(0.0).sqrt()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rig of the size of the thesis's: spool of 80 Hz, oil column at 30 Hz.
+    fn rig() -> HydraulicRig {
+        HydraulicRig {
+            spool_lag: 3e-3,
+            spool_inertia: 4e-6,
+            force_rate: 2e6,
+            oil_stiffness: 1e6,
+            leakage_rate: 4.0,
+            seal_damping: 300.0,
+            seal_friction: 0.0,
+            mass: 25.0,
+            damping: 60.0,
+            stiffness: 500.0,
+            specimen_mass: 0.0,
+            command_delay: 2e-3,
+            accelerometer_delay: 0.0,
+            load_cell_delay: 0.0,
+            accelerometer_scale: 1.0,
+        }
+    }
+
+    #[test]
+    fn the_form_has_the_paths_of_command_and_velocity_to_the_force() {
+        let own = rig();
+        let form = own.shake_table().unwrap();
+        for f in [0.1, 0.5, 2.0, 10.0, 30.0] {
+            let s = Complex::new(0.0, TAU * f);
+            // g / ((1 + l s + j s²) (s + p)), without the delay.
+            let spool = (own.spool_inertia * s + own.spool_lag) * s + 1.0;
+            let exact = own.force_rate / (spool * (s + own.leakage_rate));
+            let found = form.actuator.g1().evaluate(s);
+            assert!(
+                (found / exact - 1.0).norm() < 1e-9,
+                "{f} Hz: {found} {exact}"
+            );
+            // Minus K / (s + p) + c_p, as nearly as the form allows.
+            let exact = -(own.oil_stiffness / (s + own.leakage_rate) + own.seal_damping);
+            let found = form.actuator.g2().evaluate(s);
+            assert!(
+                (found / exact - 1.0).norm() < 0.05,
+                "{f} Hz: {found} {exact}"
+            );
+        }
+        let table = form.table;
+        assert_eq!(
+            [table.mass, table.damping, table.stiffness],
+            [25.0, 60.0, 500.0]
+        );
+    }
+
+    /// To the first order errors go through the coefficients' slopes, which are known for these.
+    #[test]
+    fn errors_of_parameters_become_those_of_the_coefficients_that_they_are_in() {
+        let own = rig();
+        let errors = |place: usize, relative: f64| {
+            let values: [f64; PARAMETERS] = own.into();
+            let mut covariance = DMatrix::zeros(PARAMETERS, PARAMETERS);
+            covariance[(place, place)] = (relative * values[place]).powi(2);
+            standard_errors(&own, &covariance).unwrap()
+        };
+        let all = coefficients(&own).unwrap();
+        let moved = |errors: [f64; COEFFICIENTS]| -> Vec<usize> {
+            (0..COEFFICIENTS)
+                .filter(|i| errors[*i] > 1e-6 * all[*i].abs())
+                .collect()
+        };
+        // Force rate and masses are in one coefficient each.
+        for (place, coefficient) in [(2, 5), (7, 9), (8, 10), (9, 11)] {
+            let found = errors(place, 0.01);
+            assert_eq!(moved(found), [coefficient]);
+            let relative = found[coefficient] / all[coefficient];
+            assert!((relative - 0.01).abs() < 1e-5, "{place}: {relative}");
+        }
+        // The leakage rate: a2 = 2 D w + p, a1 = w² + 2 D w p, a0 = w² p.
+        let found = errors(4, 0.01);
+        let (square, pole) = (1.0 / own.spool_inertia, own.leakage_rate);
+        for (i, slope) in [1.0, own.spool_lag * square, square]
+            .into_iter()
+            .enumerate()
+        {
+            assert!((found[i] / (0.01 * pole * slope) - 1.0).abs() < 1e-4, "{i}");
+        }
+        assert_eq!(found[9..], [0.0; 3]);
+    }
+}
