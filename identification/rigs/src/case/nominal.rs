@@ -404,3 +404,219 @@ impl ControlLawState {
         u.clamp(-law.limit, law.limit)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LABORATORY: &str = r#"
+sample_rate = 500.0
+[actuator]
+denominator = [2.0, 1000.0, 400000.0, 2000000.0]
+voltage_to_force = [0.0, 0.0, 80000000.0]
+velocity_to_force = [-9000.0, -4000000.0, -900000000.0]
+[table]
+mass = 0.12
+damping = 0.5
+stiffness = 3.0
+[controller]
+kind = "three_variable_control"
+proportional = 3.0
+integral = 0.1
+velocity_feedforward = 0.05
+acceleration_feedforward = 0.002
+velocity_feedback = 0.01
+acceleration_feedback = 0.001
+velocity_filter = 0.5
+limit = 10.0
+[noise]
+displacement = 0.0005
+acceleration = 1.5
+actuator_force = 0.3
+specimen_acceleration = 1.0
+valve_command = 0.001
+[uncertainty]
+relative = 0.05
+"#;
+
+    fn told(from: &str, to: &str) -> String {
+        assert!(LABORATORY.contains(from));
+        let text = LABORATORY.replacen(from, to, 1);
+        Nominal::parse(&text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_file_is_in_the_units_of_the_laboratory_unless_it_says_others() {
+        let own = Nominal::parse(LABORATORY).unwrap();
+        let close = |found: f64, expected: f64| {
+            assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+        };
+        // Over the leading coefficient, and a lbf is 4.4482216 N, an inch 25.4 mm.
+        let actuator = own.shake_table.actuator;
+        assert_eq!(actuator.denominator, [500.0, 200_000.0, 1_000_000.0]);
+        close(actuator.voltage_to_force[2], 4e7 * 4.448_221_615_260_5);
+        close(
+            actuator.velocity_to_force[0],
+            -4500.0 * 4.448_221_615_260_5 / 0.0254,
+        );
+        close(
+            own.shake_table.table.mass,
+            0.12 * 4.448_221_615_260_5 / 0.0254,
+        );
+        close(own.noise[0], 0.0005 * 0.0254);
+        close(own.noise[1], 1.5 * 0.0254);
+        close(own.noise[2], 0.3 * 4.448_221_615_260_5);
+        let law = own.controller.unwrap();
+        close(law.proportional, 3.0 / 0.0254);
+        close(law.acceleration_feedback, 0.001 / 0.0254);
+        assert_eq!((law.velocity_filter, law.limit), (0.5, 10.0));
+        assert_eq!((own.command_noise, own.uncertainty), (0.001, 0.05));
+        assert!(own.specimen.is_none());
+        // The same numbers in SI.
+        let si = Nominal::parse(&format!("units = \"si\"\n{LABORATORY}")).unwrap();
+        close(si.shake_table.actuator.voltage_to_force[2], 4e7);
+        close(si.shake_table.actuator.velocity_to_force[0], -4500.0);
+        let table = si.shake_table.table;
+        for (found, expected) in [
+            (table.mass, 0.12),
+            (table.damping, 0.5),
+            (table.stiffness, 3.0),
+            (si.noise[0], 0.0005),
+            (si.noise[1], 1.5),
+            (si.noise[2], 0.3),
+            (si.noise[3], 1.0),
+        ] {
+            close(found, expected);
+        }
+        let law = si.controller.unwrap();
+        for (found, expected) in [
+            (law.proportional, 3.0),
+            (law.integral, 0.1),
+            (law.velocity_feedforward, 0.05),
+            (law.acceleration_feedforward, 0.002),
+            (law.velocity_feedback, 0.01),
+            (law.acceleration_feedback, 0.001),
+        ] {
+            close(found, expected);
+        }
+    }
+
+    #[test]
+    fn values_that_cannot_be_are_refused_with_their_key() {
+        for (from, to, key) in [
+            ("[2.0, 1000.0", "[0.0, 1000.0", "actuator.denominator"),
+            ("displacement = 0.0005", "displacement = 0.0", "noise"),
+            ("sample_rate = 500.0", "sample_rate = -500.0", "sample_rate"),
+            ("relative = 0.05", "relative = 0.5", "uncertainty.relative"),
+            ("\"three_variable_control\"", "\"pid\"", "pid"),
+            ("mass = 0.12", "mass = -0.12", "mass"),
+        ] {
+            let told = told(from, to);
+            assert!(told.contains(key), "{told}");
+        }
+        let without = LABORATORY.replace("[actuator]", "[actuator_of_another]");
+        assert!(Nominal::parse(&without).is_err());
+    }
+
+    fn law() -> ControlLaw {
+        ControlLaw {
+            proportional: 100.0,
+            integral: 0.0,
+            velocity_feedforward: 0.0,
+            acceleration_feedforward: 0.0,
+            velocity_feedback: 0.0,
+            acceleration_feedback: 0.0,
+            velocity_filter: 0.5,
+            limit: 10.0,
+        }
+    }
+
+    #[test]
+    fn every_gain_of_the_law_acts_on_its_own_signal() {
+        const PERIOD: f64 = 0.002;
+        let at = |power: i32| -> Vec<f64> {
+            (0..200)
+                .map(|k| (f64::from(k) * PERIOD).powi(power))
+                .collect()
+        };
+        let (rest, still, ramp, bowl) = (vec![0.0; 200], vec![0.01; 200], at(1), at(2));
+        let last = |law: ControlLaw, signals: [&[f64]; 3]| {
+            let [reference, displacement, acceleration] = signals;
+            let all = law.commands(reference, displacement, acceleration, PERIOD);
+            assert_eq!(all.len(), 200);
+            // The last one has no reference ahead of it.
+            all[198]
+        };
+        let none = ControlLaw {
+            proportional: 0.0,
+            ..law()
+        };
+        for (law, signals, expected) in [
+            (law(), [&still, &rest, &rest], 1.0),
+            (law(), [&rest, &still, &rest], -1.0),
+            // 0.01 m over 199 samples of 2 ms.
+            (
+                ControlLaw {
+                    integral: 50.0,
+                    ..none
+                },
+                [&still, &rest, &rest],
+                0.199,
+            ),
+            (
+                ControlLaw {
+                    velocity_feedforward: 3.0,
+                    ..none
+                },
+                [&ramp, &rest, &rest],
+                3.0,
+            ),
+            (
+                ControlLaw {
+                    acceleration_feedforward: 0.4,
+                    ..none
+                },
+                [&bowl, &rest, &rest],
+                0.8,
+            ),
+            (
+                ControlLaw {
+                    velocity_feedback: 3.0,
+                    ..none
+                },
+                [&rest, &ramp, &rest],
+                -3.0,
+            ),
+            (
+                ControlLaw {
+                    acceleration_feedback: 5.0,
+                    ..none
+                },
+                [&rest, &rest, &still],
+                -0.05,
+            ),
+            (
+                ControlLaw {
+                    limit: 0.5,
+                    ..law()
+                },
+                [&still, &rest, &rest],
+                0.5,
+            ),
+        ] {
+            let found = last(law, signals.map(|own| &own[..]));
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "{law:?}: {found}, expected {expected}"
+            );
+        }
+        // Half of the newest difference is in the velocity at once.
+        let own = ControlLaw {
+            velocity_feedback: 1.0,
+            ..none
+        };
+        let first = own.commands(&rest, &ramp, &rest, PERIOD);
+        assert_eq!(first[0], 0.0);
+        assert!((first[1] + 0.5).abs() < 1e-9 && (first[2] + 0.75).abs() < 1e-9);
+    }
+}
