@@ -295,6 +295,18 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_holds_fmus_below_the_version_that_they_are_of() {
+        let folder = tempfile::tempdir().unwrap();
+        let holds = || holds_fmus(folder.path());
+        assert!(!holds());
+        empty(folder.path(), "fmi3/notes.txt");
+        empty(folder.path(), "One.fmu");
+        assert!(!holds());
+        empty(folder.path(), "fmi2/One.fmu");
+        assert!(holds());
+    }
+
+    #[test]
     fn an_empty_folder_is_refused_with_who_named_it() {
         let folder = tempfile::tempdir().unwrap();
         let own = Installation::new(Some(folder.path().into()), Some("guest".into()));
