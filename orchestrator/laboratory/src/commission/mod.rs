@@ -807,4 +807,49 @@ mod tests {
             "{last:?}"
         );
     }
+
+    /// A table that follows a sine of 3 Hz with nine tenths.
+    #[test]
+    fn an_excitation_grows_at_most_twofold_to_its_level_or_its_part_of_the_stroke() {
+        let omega = 6.0 * std::f64::consts::PI;
+        let shape: Vec<f64> = (0..2000)
+            .map(|k| (omega * 0.002 * f64::from(k)).sin())
+            .collect();
+        let grown = |level: f64| {
+            let request = Request {
+                plant: "made".into(),
+                specimen: "none".into(),
+                set: Vec::new(),
+                level,
+                stroke: 0.1,
+                duration: 4.0,
+                seed: 1,
+                sensor_delay: 0.0,
+                record: None,
+                reference: None,
+                played: 1.0,
+                fmi: FmiVersion::V3,
+                installation: Installation::default(),
+            };
+            let (scale, trials) = grow(&mut Bench::made(), &request, &shape).unwrap();
+            let references = trials.iter().map(|own| own.reference_m).collect::<Vec<_>>();
+            assert!(trials.iter().all(|own| own.ended.is_none()));
+            (scale, references)
+        };
+        let close = |found: &[f64], expected: &[f64]| {
+            assert_eq!(found.len(), expected.len(), "{found:?}");
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
+            }
+        };
+        // 2 m/s² are so many m.
+        let (scale, references) = grown(2.0);
+        let enough = 2.0 / (0.9 * omega * omega);
+        close(&references, &[0.002, 0.004, enough]);
+        close(&[scale], &[enough]);
+        // Four tenths of the stroke come first.
+        let (scale, references) = grown(1e3);
+        close(&references, &[0.002, 0.004, 0.008, 0.016, 0.032, 0.04]);
+        close(&[scale], &[0.04]);
+    }
 }

@@ -274,5 +274,9 @@ mod tests {
         let crossover = own.sampled.crossover_rad_s.unwrap();
         assert!((crossover / reached - 1.0).abs() < 0.02, "{crossover}");
         assert!(found.synthesis.gamma.is_none() && found.synthesis.gamma_min > 1.0);
+        let folder = tempfile::tempdir().unwrap();
+        let page = page::write(&found, &crate::results::Out::new(folder.path())).unwrap();
+        let text = std::fs::read_to_string(page).unwrap();
+        assert!(text.contains("Loops of the shake table"));
     }
 }

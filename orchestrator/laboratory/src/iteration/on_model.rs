@@ -200,3 +200,63 @@ fn not_followed(reason: &str) -> Error {
         reason: format!("the model does not follow the motion under the case's law: {reason}"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 0.002;
+    const BAND: [f64; 2] = [0.1, 30.0];
+
+    /// A rig with so much dry friction (N) under displacement control.
+    fn rig(friction: f64) -> ModelledRig {
+        let law = ControlLaw {
+            proportional: 118.0,
+            integral: 0.0,
+            velocity_feedforward: 0.0,
+            acceleration_feedforward: 0.0,
+            velocity_feedback: 0.0,
+            acceleration_feedback: 0.0,
+            velocity_filter: 0.5,
+            limit: 10.0,
+        };
+        let mut rig = IdentifiedRig::default();
+        rig.effects.friction.coulomb_force = friction;
+        ModelledRig::new(&rig, &law, PERIOD).unwrap()
+    }
+
+    #[test]
+    fn a_linear_rig_follows_after_one_correction_and_its_inverse_is_that_of_its_linear_part() {
+        let wanted = motion::built_in(3, &motion::Options::default()).unwrap();
+        let search = Search {
+            corrections: 1,
+            band: BAND,
+        };
+        let (smooth, rough) = (rig(0.0), rig(40.0));
+        let found = smooth.drive(&wanted, &search).unwrap();
+        assert_eq!(found.errors.len(), 2);
+        assert!(
+            found.errors[1] < 0.15 * found.errors[0],
+            "{:?}",
+            found.errors
+        );
+        assert_eq!(found.errors[1], found.tracking.time_domain_percent);
+        let again = smooth.follow(&found.drive.displacement);
+        assert_eq!(again.peak_command, found.peak_command);
+        // What friction does is not part of it.
+        assert!(rough.follow(&wanted.displacement) != smooth.follow(&wanted.displacement));
+        let corrected = |own: &ModelledRig| {
+            let mut drive = wanted.clone();
+            own.inverse(BAND)
+                .correct(&mut drive, &wanted.acceleration, 1.0);
+            drive.displacement
+        };
+        let (one, other) = (corrected(&smooth), corrected(&rough));
+        let off = one
+            .iter()
+            .zip(&other)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        assert!(off < 1e-9, "{off} m");
+    }
+}
