@@ -208,3 +208,126 @@ impl HydraulicIdentification {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use identification::closed_loop::equations::{HydraulicRig, PARAMETERS};
+    use identification::closed_loop::specimen::{SpecimenFit, SpecimenOverMass};
+    use nalgebra::DMatrix;
+    use plant::identified::seal_shape::SealShape;
+
+    use super::*;
+
+    /// A rig with a specimen of 2 Hz and 5 % of critical damping, and a second payload.
+    fn found(seal_friction: f64, yield_displacement: f64) -> HydraulicIdentification {
+        let rig = HydraulicRig {
+            spool_lag: 3e-3,
+            spool_inertia: 4e-6,
+            force_rate: 2e6,
+            oil_stiffness: 1e6,
+            leakage_rate: 4.0,
+            seal_damping: 300.0,
+            seal_friction,
+            mass: 25.0,
+            damping: 60.0,
+            stiffness: 500.0,
+            specimen_mass: 8.0,
+            command_delay: 2e-3,
+            accelerometer_delay: 0.0,
+            load_cell_delay: 0.0,
+            accelerometer_scale: 1.0,
+        };
+        let values: [f64; PARAMETERS] = rig.into();
+        let errors = values.map(|value| 0.01 * value);
+        let specimen = SpecimenOverMass {
+            yield_displacement,
+            ..SpecimenOverMass::elastic(1.2566, 157.91)
+        };
+        let found = Found {
+            rig,
+            standard_error: errors,
+            covariance: DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+                if i == j { errors[i] * errors[i] } else { 0.0 }
+            }),
+            payloads: vec![12.5],
+            shape: SealShape {
+                presliding: 1e-5,
+                excess: 0.2,
+                stribeck_velocity: 0.01,
+                sharpness: 1.0,
+                relaxation: 0.0,
+            },
+            valve: None,
+            mean_squares: [1.0, 1.1, 1.2],
+            specimen: Some(SpecimenFit {
+                specimen,
+                covariance: DMatrix::identity(5, 5) * 0.04,
+                misfit: 0.01,
+            }),
+            converged: true,
+            noise: [1e-5, 0.04, 1.3, 0.025, 1e-3],
+            period: 0.002,
+            warnings: vec!["the record is short".into()],
+        };
+        HydraulicIdentification {
+            file: found.model_file().unwrap(),
+            found,
+            check: Check {
+                mean_squares: [1.5, 2.0, 3.5],
+                relative_errors: [0.01, 0.02, 0.04],
+            },
+        }
+    }
+
+    fn row<'a>(all: &'a [Parameter], name: &str) -> Option<&'a Parameter> {
+        all.iter().find(|own| own.name == name)
+    }
+
+    #[test]
+    fn parameters_are_those_of_the_rig_and_of_what_stands_on_it() {
+        let all = found(30.0, 0.01).parameters();
+        let value = |name: &str| row(&all, name).unwrap().value;
+        assert_eq!((value("table mass"), value("force rate")), (25.0, 2e6));
+        assert!((value("specimen frequency") - 2.0).abs() < 1e-3);
+        assert_eq!(value("specimen damping/mass"), 1.2566);
+        let damping = &row(&all, "specimen damping/mass").unwrap().error;
+        assert!(matches!(damping, Uncertainty::Estimated(error) if (error - 0.2).abs() < 1e-12));
+        assert_eq!(value("specimen yield displacement"), 0.01);
+        assert_eq!(value("payload of recording 2"), 12.5);
+        assert!(row(&all, "seal Stribeck velocity").is_some());
+        // What does not slide or yield has no shape of it.
+        let elastic = found(0.0, f64::INFINITY).parameters();
+        for name in ["seal Stribeck velocity", "specimen yield displacement"] {
+            assert!(row(&elastic, name).is_none(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_model_that_its_data_contradict_says_so_first() {
+        let mut own = found(30.0, 0.01);
+        assert!(own.holds());
+        let summary = own.summary(Path::new("model.toml"), Vec::new(), 1.0);
+        assert_eq!(summary.warnings, ["the record is short"]);
+        assert_eq!(summary.fit_percent["acceleration"], Some(99.0));
+        assert_eq!(summary.fit_percent["valve_command"], Some(96.0));
+        let rows = own.equations();
+        assert_eq!(rows[2], ["actuator: command", "1.20", "3.50", "4.00 %"]);
+        // Poles of spool, leakage and table.
+        assert_eq!(summary.actuator_poles_rad_s.len(), 3);
+        assert!(
+            summary
+                .actuator_poles_rad_s
+                .iter()
+                .any(|pole| (pole[0] + 4.0).abs() < 1e-6)
+        );
+        let size = summary.table_poles_rad_s[0][0].hypot(summary.table_poles_rad_s[0][1]);
+        assert!((size - 20.0_f64.sqrt()).abs() < 1e-6);
+        own.check.mean_squares[2] = 4.5;
+        assert!(!own.holds());
+        let summary = own.summary(Path::new("model.toml"), Vec::new(), 1.0);
+        assert!(summary.warnings[0].starts_with("the model does not explain these recordings"));
+        let page = own.report(&summary);
+        assert_eq!(page.summary, summary.warnings[0]);
+        assert_eq!(page.sections[0].tables.len(), 2);
+    }
+}
