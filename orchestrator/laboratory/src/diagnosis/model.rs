@@ -406,3 +406,151 @@ impl Validation {
         text
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use identification::diagnosis::rigs::shake_table::ChannelErrors;
+
+    use super::*;
+
+    fn errors(file: &str, refitted: f64, session: &[(&str, f64)]) -> FileErrors {
+        let session = session
+            .iter()
+            .map(|(name, value)| ((*name).to_string(), *value));
+        FileErrors {
+            file: file.into(),
+            channel: "position".into(),
+            nominal_percent: refitted,
+            described_percent: 12.3,
+            extended_percent: 1.2,
+            extended_rms: 3.4e-5,
+            unit: "m".into(),
+            session: session.collect(),
+            notes: Vec::new(),
+        }
+    }
+
+    fn validation(records: Vec<FileErrors>, tables: Vec<TableErrors>) -> Validation {
+        Validation {
+            model: "extended_model.toml".into(),
+            records,
+            tables,
+        }
+    }
+
+    #[test]
+    fn errors_of_a_rig_are_a_row_per_file_with_what_is_the_files_own() {
+        let mut second = errors("b.csv", 5.6, &[("zero", 2e-3)]);
+        second.notes.push("the record is short".into());
+        let all = validation(vec![errors("a.csv", 5.6, &[]), second], Vec::new());
+        assert_eq!(
+            all.text(),
+            "error relative to variation, nothing fitted  except parameters of a file\n\
+             file    channel  as described  refitted  extended   rms error\n\
+             a.csv  position       12.30 %    5.60 %    1.20 %  3.400e-5 m\n\
+             b.csv  position       12.30 %    5.60 %    1.20 %  3.400e-5 m\n\
+             b.csv: zero 2.000e-3 (SI)\n\
+             note: the record is short\n"
+        );
+        // Of an FMU there is no refitted model.
+        let foreign = validation(vec![errors("a.csv", 12.3, &[])], Vec::new()).text();
+        assert!(
+            !foreign.contains("refitted") && !foreign.contains("except"),
+            "{foreign}"
+        );
+    }
+
+    #[test]
+    fn errors_of_a_table_are_a_row_per_channel_and_one_of_all() {
+        let table = TableErrors {
+            file: "v.csv".into(),
+            channels: vec![ChannelErrors {
+                channel: "displacement".into(),
+                described_percent: 7.0,
+                extended_percent: 2.0,
+                extended_rms: 4e-5,
+                unit: "m".into(),
+                zero: -1.5e-4,
+                floor_percent: 1.5,
+            }],
+            described_in_noise: 4.5,
+            extended_in_noise: 1.25,
+        };
+        let records: Vec<FileErrors> = by_channel(&table).collect();
+        let own = &records[0];
+        assert_eq!(
+            (
+                own.described_percent,
+                own.extended_percent,
+                own.extended_rms
+            ),
+            (7.0, 2.0, 4e-5)
+        );
+        assert_eq!(own.session["displacement_zero"], -1.5e-4);
+        let text = validation(records, vec![table]).text();
+        let rows: Vec<String> = text
+            .lines()
+            .map(|line| line.split_whitespace().collect::<Vec<_>>().join(" "))
+            .collect();
+        assert_eq!(
+            rows[1..],
+            [
+                "file channel as described extended noise alone",
+                "v.csv displacement 7.00 % 2.00 % 1.50 %",
+                "v.csv all, in the noise 4.50 times 1.25 times 1.00 times",
+                "v.csv: zeros displacement -1.50e-4 m",
+            ]
+        );
+    }
+
+    #[test]
+    fn options_that_are_not_for_the_model_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let foreign = write("foreign.toml", "[components.a]\nfmu = \"a.fmu\"\n");
+        let rig = write("rig.toml", "kind = \"arm\"\n");
+        let other = Path::new("other");
+        let installation = Installation::default();
+        let asked = |model| Asked {
+            model,
+            columns: None,
+            fmu: None,
+            map: None,
+            isolate: None,
+            installation: &installation,
+        };
+        let told = |asked: &Asked<'_>| validate(asked, &[]).unwrap_err().to_string();
+        let own = Asked {
+            columns: Some(other),
+            ..asked(&foreign)
+        };
+        assert!(told(&own).contains("expected --map, the map of its data"));
+        for (option, own) in [
+            (
+                "--fmu",
+                Asked {
+                    fmu: Some(other),
+                    ..asked(&rig)
+                },
+            ),
+            (
+                "--map",
+                Asked {
+                    map: Some(other),
+                    ..asked(&rig)
+                },
+            ),
+        ] {
+            let told = told(&own);
+            assert!(
+                told.contains(option) && told.contains("is not the model of an FMU"),
+                "{told}"
+            );
+        }
+        assert!(told(&asked(&foreign)).contains("map.toml is missing"));
+    }
+}

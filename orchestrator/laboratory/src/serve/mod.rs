@@ -422,3 +422,71 @@ fn ended(error: Option<SessionError>) -> Ended {
 pub fn usual_folder(system: &str) -> PathBuf {
     Path::new("shakebench-results").join(format!("{system}-served"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn element(units: Option<&str>, force: &[&str], stiffness: &[f64]) -> ElementFile {
+        ElementFile {
+            units: units.map(Into::into),
+            force: force.iter().map(ToString::to_string).collect(),
+            stiffness: stiffness.to_vec(),
+            ..ElementFile::default()
+        }
+    }
+
+    #[test]
+    fn options_come_before_the_file_one_by_one() {
+        let file = element(Some("m,N"), &["table.force"], &[1.0]);
+        let options = element(Some("in,kip"), &[], &[2.0]);
+        assert_eq!(
+            joined(&file, &options),
+            element(Some("in,kip"), &["table.force"], &[2.0])
+        );
+        assert_eq!(joined(&file, &ElementFile::default()), file);
+    }
+
+    #[test]
+    fn a_stiffness_is_in_the_units_of_the_client_and_square() {
+        let scale = Scale::read("mm,kN").unwrap();
+        let of = |values: &[f64], n| matrices(&element(None, &[], values), &scale, n);
+        // A kN/mm is a MN/m.
+        let found = of(&[2.0, -1.0, -1.0, 3.0], 2).unwrap().stiffness.unwrap();
+        for (found, expected) in found.iter().zip([2e6, -1e6, -1e6, 3e6]) {
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found}");
+        }
+        assert_eq!(of(&[], 2).unwrap(), Matrices::default());
+        for values in [&[1.0][..], &[1.0, 0.0, 0.0, f64::NAN]] {
+            let told = of(values, 2).unwrap_err().to_string();
+            assert!(
+                told.contains("--stiffness") && told.contains("expected 4 finite ones"),
+                "{told}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_client_that_fails_fails_the_run() {
+        assert!(matches!(ended(None), Ended::Complete));
+        let closed = SessionError::Link(bridges::LinkError::Closed);
+        let told = closed.to_string();
+        let Ended::Failed(MasterError::Client(reason)) = ended(Some(closed)) else {
+            panic!("a failure expected")
+        };
+        assert_eq!(reason, told);
+        assert!(usual_folder("mpc").ends_with("mpc-served"));
+    }
+
+    #[test]
+    fn the_times_of_exchanges_are_those_of_their_histogram() {
+        let mut trips = RoundTrips::default();
+        for k in 1..=1000 {
+            trips.add(std::time::Duration::from_micros(k));
+        }
+        let own = Times::of(&trips);
+        assert_eq!((own.count, own.longest_s), (1000, 1e-3));
+        assert!((500e-6..570e-6).contains(&own.median_s), "{}", own.median_s);
+        assert!((990e-6..=1e-3).contains(&own.p999_s), "{}", own.p999_s);
+    }
+}

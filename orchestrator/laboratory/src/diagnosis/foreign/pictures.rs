@@ -60,3 +60,52 @@ pub(super) fn panels(subject: &ForeignModel<'_>, found: &ForeignDiagnosis) -> Ve
     }
     panels
 }
+
+#[cfg(test)]
+mod tests {
+    use plant::signal_path::SignalEffects;
+
+    use super::super::{simulator, written};
+    use super::*;
+    use pages::report::Abscissa;
+
+    #[test]
+    fn errors_are_shown_on_the_data_that_were_held_out() {
+        let alone = simulator::tests::alone();
+        let subject = written::tests::subject(&alone);
+        let none = SignalEffects::NONE;
+        let all = panels(&subject, &written::tests::found(none, none));
+        let titles: Vec<&str> = all.iter().map(|own| &*own.title).collect();
+        assert_eq!(
+            titles,
+            [
+                "y of held out, measured and simulated",
+                "error of y on the held-out data"
+            ]
+        );
+        let values = |panel: usize| {
+            let series = all[panel].series.iter();
+            series
+                .map(|own| (&*own.name, own.values.clone()))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            values(0),
+            [
+                ("measured", vec![1.0, 2.0, 3.0, 4.0]),
+                ("nominal", vec![0.5; 4]),
+                ("extended", vec![1.0, 2.0, 3.0, 3.75])
+            ]
+        );
+        for ((name, values), expected) in values(1).iter().zip([[2.5, 3.5], [0.0, 0.25]]) {
+            assert!(values[..2].iter().all(|own| own.is_nan()), "{name}");
+            assert_eq!(values[2..], expected, "{name}");
+        }
+        // Five steps of 0.01 s a sample.
+        let Abscissa::Even { step, .. } = &all[0].series[0].abscissa else {
+            panic!("evenly sampled")
+        };
+        assert!((step - 0.05).abs() < 1e-15);
+        assert_eq!(all[0].y.label, "y [m]");
+    }
+}

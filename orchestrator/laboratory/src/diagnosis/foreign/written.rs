@@ -229,7 +229,7 @@ pub(super) fn traces(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use identification::diagnosis::rigs::foreign::{Extension, Parameter, Trial};
 
     use super::super::simulator;
@@ -271,20 +271,19 @@ mod tests {
         assert!(none.ends_with("[parameters]\nperiod = 0.002\n"), "{none}");
     }
 
-    /// The extended model of `y = 3 u` with these effects on its input and its output.
-    fn extended(inputs: SignalEffects, outputs: SignalEffects) -> SystemFile {
-        let alone = simulator::tests::alone();
+    /// `y = 3 u` with two records, of which the second is held out in part.
+    pub(in crate::diagnosis::foreign) fn subject(alone: &Alone) -> ForeignModel<'_> {
         let trial = |name: &str, left_out: [bool; 4]| Trial {
             name: name.into(),
             step: 0.01,
             stride: 5,
             inputs: vec![vec![0.0; 16]],
-            outputs: vec![vec![0.0; 4]],
+            outputs: vec![vec![1.0, 2.0, 3.0, 4.0]],
             left_out: left_out.to_vec(),
         };
-        let subject = ForeignModel {
+        ForeignModel {
             name: "gain".into(),
-            simulator: &alone,
+            simulator: alone,
             inputs: vec![signal("u", "V")],
             outputs: vec![signal("y", "m")],
             parameters: vec![Parameter {
@@ -297,8 +296,16 @@ mod tests {
                 trial("fitted", [false; 4]),
                 trial("held out", [false, false, true, true]),
             ],
-        };
-        let found = ForeignDiagnosis {
+        }
+    }
+
+    /// A diagnosis that found these effects on input and output, and another gain.
+    pub(in crate::diagnosis::foreign) fn found(
+        inputs: SignalEffects,
+        outputs: SignalEffects,
+    ) -> ForeignDiagnosis {
+        let played = |values: [f64; 4]| vec![vec![vec![0.0; 4]], vec![values.to_vec()]];
+        ForeignDiagnosis {
             found: crate::made::rig_diagnosis("fmu"),
             equivalents: Vec::new(),
             notes: Vec::new(),
@@ -307,10 +314,17 @@ mod tests {
                 outputs: vec![outputs],
                 parameters: vec![(0, 1.25)],
             },
-            nominal: Vec::new(),
-            extended: Vec::new(),
+            nominal: played([0.5; 4]),
+            extended: played([1.0, 2.0, 3.0, 3.75]),
             predictable: 0.0,
-        };
+        }
+    }
+
+    /// The extended model with these effects on the input and the output.
+    fn extended(inputs: SignalEffects, outputs: SignalEffects) -> SystemFile {
+        let alone = simulator::tests::alone();
+        let subject = subject(&alone);
+        let found = found(inputs, outputs);
         assert_eq!(shown(&subject), 1);
         let text = system(&alone, Path::new("Gain"), &subject, &found).unwrap();
         assert!(text.starts_with("# gain with the effects around it, on the record held out."));
