@@ -198,4 +198,42 @@ mod tests {
             assert!(windows[begin.at + 10] < 1e-5, "{}", begin.at);
         }
     }
+
+    /// Cogging of magnets 8 mm apart, on an axis that goes to and fro over 25 of them.
+    #[test]
+    fn a_ripple_is_looked_for_at_the_period_that_the_errors_have_over_the_position() {
+        use std::f64::consts::TAU;
+        let (h, n) = (2e-3, 4000);
+        let position: Vec<f64> = (0..n)
+            .map(|k| 0.1 * (1.0 - (0.5 * TAU * h * k as f64).cos()))
+            .collect();
+        let errors: Vec<f64> = position
+            .iter()
+            .map(|q| 1e-4 * (TAU * q / 0.008 + 0.7).sin())
+            .collect();
+        let channels = vec![(MOTOR_VOLTAGE, vec![2.0; n]), (POSITION, position)];
+        let recording = Recording::new("axis", h, channels).unwrap();
+        let recording = RigRecording::new(recording, LinearAxis::INPUTS, POSITION);
+        let nominal = Nominal {
+            mass: 50.0,
+            viscous_friction: 200.0,
+            coulomb_friction: 40.0,
+            offset: 0.0,
+            force_gain: 30.0,
+            stiffness: 0.0,
+        };
+        let starts = LinearAxis.starts(&recording, &nominal, &errors);
+        assert!(starts.len() >= 4 && starts.iter().all(|own| own.0 == "force_ripple"));
+        // Every phase at a fiftieth of the friction, the strongest period first.
+        for ((_, start), [cosine, sine]) in
+            starts
+                .iter()
+                .zip([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
+        {
+            assert!(
+                (start[0] - 0.8 * cosine).abs() < 1e-12 && (start[1] - 0.8 * sine).abs() < 1e-12
+            );
+            assert!((start[2] / 0.008 - 1.0).abs() < 0.02, "{start:?}");
+        }
+    }
 }
