@@ -586,6 +586,27 @@ mod tests {
     }
 
     #[test]
+    fn controllers_are_tuned_on_the_model_that_is_named_or_that_of_the_commissioning() {
+        let of = |plant: &str, file: Option<&str>| Request {
+            plant: plant.into(),
+            control_model: file.map(Into::into),
+            ..Request::built_in("three-variable")
+        };
+        assert!(
+            control_model(&of("servohydraulic", None))
+                .unwrap()
+                .is_some()
+        );
+        assert!(control_model(&of("identified", None)).unwrap().is_none());
+        let told = control_model(&of("identified", Some("missing.toml")));
+        let told = told.unwrap_err().to_string();
+        assert!(
+            told.contains("--control-model") && told.contains("missing.toml"),
+            "{told}"
+        );
+    }
+
+    #[test]
     fn an_axis_at_rest_is_measured_by_the_peak_of_the_other() {
         let wave = made::wave("wave", 500);
         let still = wave.at_rest();
