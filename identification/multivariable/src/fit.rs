@@ -395,3 +395,26 @@ pub(crate) fn repeats(residual: &[f64]) -> f64 {
         .sum();
     (1.0 + 2.0 * sum).max(1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `e[k] = r e[k - 1] + n[k]`: one of `(1 + r)/(1 - r)` counts.
+    #[test]
+    fn residuals_with_memory_count_as_fewer() {
+        let of = |memory: f64| {
+            let (mut state, mut own) = (1_u32, 0.0);
+            let mut next = |_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                own = memory * own + f64::from(state >> 8) / f64::from(1 << 23) - 1.0;
+                own
+            };
+            repeats(&(0..100_000).map(&mut next).collect::<Vec<_>>())
+        };
+        assert!((of(0.5) / 3.0 - 1.0).abs() < 0.1, "{}", of(0.5));
+        assert!((of(0.0) - 1.0).abs() < 0.1, "{}", of(0.0));
+        // What swings counts no more than once.
+        assert_eq!(of(-0.5), 1.0);
+    }
+}

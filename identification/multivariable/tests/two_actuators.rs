@@ -230,6 +230,17 @@ fn a_rig_is_identified_with_errors_that_hold() {
             model.residual_m
         );
     }
+    // A pole that is quicker than what was recorded has no error.
+    let poles = model.poles_rad_s.iter().zip(&model.poles_standard_error);
+    let known: Vec<_> = poles.filter(|(_, error)| error[0].is_finite()).collect();
+    assert!(known.len() > 1);
+    for ([re, im], [of_re, of_im]) in known {
+        assert!(
+            *of_re > 0.0 && *of_re < 0.2 * re.hypot(*im),
+            "{re} ± {of_re}"
+        );
+        assert_eq!(*of_im > 0.0, *im > 0.0, "{im} ± {of_im}");
+    }
     let found = interaction(&model).unwrap();
     let relative =
         truth[0][0] * truth[1][1] / (truth[0][0] * truth[1][1] - truth[0][1] * truth[1][0]);
@@ -278,6 +289,21 @@ fn a_fault_of_each_actuator_is_named_with_its_value_and_a_healthy_rig_has_none()
     let model = identified(folder.path(), &rig, &mut draw);
     let well = diagnosed(folder.path(), &model, &rig.record(&mut draw, 3, 2.5e-3));
     assert_eq!(well.verdict, Verdict::Adequate, "{}", well.sentence);
+    let mut reads_more = rig.clone();
+    reads_more.sensor[1] = 1.04;
+    let found = diagnosed(
+        folder.path(),
+        &model,
+        &reads_more.record(&mut draw, 3, 2.5e-3),
+    );
+    let [own] = &found.effects[..] else {
+        panic!("{}", found.sentence)
+    };
+    assert_eq!(
+        (&*own.effect, &own.actuators[..]),
+        ("sensor_gain", &[2][..])
+    );
+    assert!((own.value.unwrap() - 0.04).abs() < 0.004, "{own:?}");
     let mut changed = rig.clone();
     (changed.gain[0], changed.delay[1]) = (1.08, rig.delay[1] + 4);
     let found = diagnosed(folder.path(), &model, &changed.record(&mut draw, 3, 2.5e-3));
