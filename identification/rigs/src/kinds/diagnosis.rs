@@ -367,7 +367,8 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let [mut causes, mut suspected] = [found.named, found.suspected]
         .map(|all| all.into_iter().filter(is_open).collect::<Vec<Cause>>());
     // Of records that no model explains, sensors tell less too.
-    let tells = holds || explains || leaves_little;
+    let is_explained = confirmed.fitted_error < NEAR;
+    let tells = holds || explains || leaves_little || is_explained;
     let (clear, unclear): (Vec<Cause>, Vec<Cause>) = measured
         .contradictions()
         .into_iter()

@@ -142,14 +142,14 @@ fn slowed(free: f64, most: f64, sliding_speed: f64, near: Option<f64>) -> f64 {
     let per_speed = 1.0 / sliding_speed;
     // In sliding speeds: x + most tanh(x) = end has one solution, which is between the end less most and the end.
     let (end, most) = (per_speed * free.abs(), per_speed * most);
-    let (mut low, mut high) = ((end - most).max(0.0), end);
-    if low > SATURATED {
-        return (sliding_speed * low).copysign(free);
+    if end - most > SATURATED {
+        return (sliding_speed * (end - most)).copysign(free);
     }
+    // From the left, where the sum bends down, no step goes too far.
+    let (mut low, mut high) = ((end - most).max(end / (1.0 + most)), end);
     let near = near.map(|v| per_speed * v.copysign(v * free));
-    let mut x = near
-        .filter(|near| (low..=high).contains(near))
-        .unwrap_or_else(|| low.max(high / (1.0 + most)));
+    let near = near.filter(|near| (low..=high).contains(near));
+    let mut x = near.unwrap_or(low);
     for _ in 0..20 {
         // Halley's method, all times (1 + e)^2: one exponential and one division.
         let e = (-2.0 * x).exp();
@@ -166,6 +166,8 @@ fn slowed(free: f64, most: f64, sliding_speed: f64, near: Option<f64>) -> f64 {
         let next = x - step;
         x = if (low..=high).contains(&next) {
             next
+        } else if x > low {
+            low
         } else {
             0.5 * (low + high)
         };
@@ -469,20 +471,16 @@ mod tests {
 
     #[test]
     fn speed_and_friction_balance_wherever_the_search_begins() {
-        for most in [0.03, 0.5, 7.0, 200.0] {
-            for end in [0.0, 0.2, 0.9, 0.999, 1.0, 1.02, 1.5, 40.0].map(|part| part * (most + 1.0))
-            {
-                let balanced = |near: Option<f64>| {
-                    let speed = slowed(-end, most, 1.0, near);
-                    let friction = most * speed.tanh();
-                    assert!(
-                        (speed + friction + end).abs() < 1e-7 * (1.0 + most),
-                        "{most} {end} {near:?}: {speed}"
-                    );
-                };
-                balanced(None);
+        for most in [0.03, 0.5, 7.0, 200.0, 1e6] {
+            for part in [0.0, 0.2, 0.9, 0.999, 0.999_999_9, 1.0, 1.02, 1.5, 40.0] {
+                let end: f64 = part * (most + 1.0);
+                let found = slowed(-end, most, 1.0, None);
+                let off = found + most * found.tanh() + end;
+                assert!(off.abs() < 1e-9 * (1.0 + most), "{most} {part}: {found}");
                 for near in [-1.0, -0.5, -0.01, 0.0, 0.3].map(|part| part * end) {
-                    balanced(Some(near));
+                    let again = slowed(-end, most, 1.0, Some(near));
+                    let off = (again - found).abs();
+                    assert!(off < 1e-8 * (1.0 - found), "{most} {part} {near}: {again}");
                 }
             }
         }
