@@ -5,10 +5,8 @@ use rayon::prelude::*;
 use super::confirmed::{clearly_better, lengths};
 use super::parts::{EVERYTHING, InParts};
 use super::readings::FAR;
-use diagnosis::{Free, Point, all_errors, least_squares, looked, settled, settled_along, squares};
+use diagnosis::{Point, all_errors, looked, settled, settled_along, squares};
 
-/// Steps after which only the fit that is ahead goes on.
-const RACE: usize = 4;
 /// Growth of the squared error that tells nothing: no model is exact; and as a share of what is not white noise.
 const INEXACT: f64 = 0.01;
 const COLOURED: f64 = 0.2;
@@ -193,12 +191,9 @@ impl<M: InParts> Profiled<'_, M> {
             (squares(&errors) / squares(&self.errors), errors, best)
         };
         // Of several ways to the same end the one that is ahead is walked to it.
-        let first = starts.par_iter();
-        let first = first.filter_map(|start| {
-            least_squares(&held, start, EVERYTHING, &Free::All, RACE).map(|found| found.point)
-        });
-        let first = first.map(grown).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let near = grown(looked(&held, &first.2, EVERYTHING)?);
+        let near = starts.par_iter();
+        let near = near.filter_map(|start| looked(&held, start, EVERYTHING).map(grown));
+        let near = near.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let (growth, errors, best) = if near.0 > FAR {
             near
         } else {
