@@ -532,7 +532,6 @@ mod tests {
             shaped.shape(30.0).unwrap().1
         };
         let found = [0.0, 0.005, 0.010, 0.020].map(gamma);
-        println!("{found:?}");
         for pair in found.windows(2) {
             assert!(pair[1] > 1.05 * pair[0], "{found:?}");
         }

@@ -54,6 +54,8 @@ pub const STARTS_SEED: u64 = 15;
 /// Steps of a first look and of a fit to the end.
 const LOOK: usize = 6;
 const TO_THE_END: usize = 40;
+/// Models of which errors on the folds are kept.
+const KEPT: usize = 16;
 /// Steps of a fit that begins near its end.
 pub const AGAIN: usize = 12;
 /// Squared error of a model after those, over its least from another start, beyond which it does not become the best.
@@ -303,9 +305,6 @@ struct CrossValidation<'a, M: SimulatedModel> {
     known: Mutex<VecDeque<(Point, [Vec<f64>; 2])>>,
 }
 
-/// Models of which errors on the folds are kept.
-const KEPT: usize = 16;
-
 impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
     fn new(model: &'a M, record: usize, observer: Observer<'a>) -> Self {
         Self {
@@ -413,9 +412,8 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
     fn crossed(&self, fitted: &Simulated) -> Option<[Vec<f64>; 2]> {
         let model = self.model;
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = known().iter().find(|own| own.0 == fitted.point).cloned();
-        if let Some((_, errors)) = same {
-            return Some(errors);
+        if let Some((_, errors)) = known().iter().find(|own| own.0 == fitted.point) {
+            return Some(errors.clone());
         }
         let [one, two] = model.folds(self.record);
         let on_other = |own: usize, tested: usize| {

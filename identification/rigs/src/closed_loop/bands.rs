@@ -315,19 +315,10 @@ fn is_stirred(band: &Band) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::made::noise;
     use super::*;
 
     const PERIOD: f64 = 0.005;
-
-    /// Noise from -1 to 1.
-    fn noise(samples: usize, seed: u32) -> Vec<f64> {
-        let mut state = seed;
-        let next = |_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
-        };
-        (0..samples).map(next).collect()
-    }
 
     /// `y = 0.6 r[k] + 0.3 r[k - 1]`.
     fn answer(reference: &[f64]) -> Vec<f64> {
@@ -337,19 +328,22 @@ mod tests {
             .collect()
     }
 
+    /// A reference, what follows it, and that with noise.
+    fn recorded() -> [Vec<f64>; 3] {
+        let reference = noise(4000, 1);
+        let clean = answer(&reference);
+        let pairs = clean.iter().zip(noise(4000, 9));
+        let measured = pairs.map(|(y, n)| y + 0.2 * n).collect();
+        [reference, clean, measured]
+    }
+
     fn square(values: &[f64]) -> f64 {
         values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
     }
 
     #[test]
     fn projections_on_the_reference_have_the_response_and_the_rest_the_noise() {
-        let reference = noise(4000, 1);
-        let (clean, disturbance) = (answer(&reference), noise(4000, 9));
-        let measured: Vec<f64> = clean
-            .iter()
-            .zip(&disturbance)
-            .map(|(y, n)| y + 0.2 * n)
-            .collect();
+        let [reference, _, measured] = recorded();
         let own = Bands::new(
             "a",
             &[&reference],
@@ -378,13 +372,7 @@ mod tests {
 
     #[test]
     fn what_the_reference_explains_is_free_of_most_of_the_noise() {
-        let reference = noise(4000, 1);
-        let (clean, disturbance) = (answer(&reference), noise(4000, 9));
-        let measured: Vec<f64> = clean
-            .iter()
-            .zip(&disturbance)
-            .map(|(y, n)| y + 0.2 * n)
-            .collect();
+        let [reference, clean, measured] = recorded();
         let band = (0.0, 100.0);
         let rest = |signal: &[f64]| {
             let found = explained(&reference, signal, PERIOD, band).unwrap();

@@ -12,6 +12,8 @@ pub mod equations;
 mod fitting;
 pub mod friction;
 mod lateness;
+#[cfg(test)]
+mod made;
 mod model_section;
 pub mod replay;
 mod seals;

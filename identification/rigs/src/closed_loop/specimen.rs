@@ -203,6 +203,7 @@ pub fn fit(
 
 #[cfg(test)]
 mod tests {
+    use super::super::made::noise;
     use super::*;
 
     const PERIOD: f64 = 0.004;
@@ -251,16 +252,6 @@ mod tests {
         assert!((yielding.hysteretic_rate(0.3, 0.005) / 0.225 - 1.0).abs() < 1e-12);
         // Unloading is elastic again.
         assert_eq!(yielding.hysteretic_rate(-0.3, 0.005), -0.3);
-    }
-
-    /// Noise from -1 to 1.
-    fn noise(samples: usize, seed: u32) -> Vec<f64> {
-        let mut state = seed;
-        let next = |_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 23) - 1.0
-        };
-        (0..samples).map(next).collect()
     }
 
     /// Accelerations of a base under random motion and of the mass on it, in a hundred steps a sample.
