@@ -51,7 +51,8 @@ const CLEARLY: f64 = 0.9;
 const ENDED: usize = 3;
 /// Seed of those starts.
 pub const STARTS_SEED: u64 = 15;
-/// Steps of a first look and of a fit to the end.
+/// Steps of a glance, of a first look and of a fit to the end.
+const GLANCE: usize = 2;
 const LOOK: usize = 6;
 const TO_THE_END: usize = 40;
 /// Models of which errors on the folds are kept.
@@ -439,7 +440,7 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         // A model without an effect bends its parameters towards it: from the stated ones the way to
         // the right effect may be straighter.
         let stated = as_stated(model, &base.point);
-        let bases: Vec<(Point, Columns)> = [base.point.clone(), stated]
+        let bases: Vec<(Point, Columns)> = [base.point.clone(), stated.clone()]
             .into_par_iter()
             .filter_map(|point| {
                 let start = solution(model, &point, screen)?;
@@ -452,7 +453,8 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             base.point.effects.iter().any(|(i, _)| held(*i))
         };
         let suggested = model.starts(&base.point, screen);
-        let begun = if base.point.effects.is_empty() {
+        let is_bare = base.point.effects.is_empty();
+        let begun = if is_bare {
             model.begun(&base.point, screen)
         } else {
             Vec::new()
@@ -474,7 +476,9 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
                 });
                 let with_it = |point: &Point| point.effects.iter().any(|(i, _)| *i == effect);
                 let begun: Vec<&Point> = begun.iter().filter(|point| with_it(point)).collect();
+                let own = is_bare.then(|| looked_with(model, &stated, effect, &values, screen));
                 let all = starts.chain(opened(model, &begun, screen, LOOK));
+                let all = all.chain(own.flatten());
                 let best = all.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
                 Some((effect, best))
             })
@@ -612,6 +616,26 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
             .filter(|&i| !compared[i].holds());
         Some(least.map(|i| self.without[i].clone()))
     }
+}
+
+/// `effect` beside the nominal parameters at `stated`, from the one of the `values` to begin with that is best after a
+/// glance. The derivatives are its own: where it changes the whole motion, as an overlap does with small commands, those
+/// of a model without it mislead.
+fn looked_with<M: SimulatedModel>(
+    model: &M,
+    stated: &Point,
+    effect: usize,
+    values: &[&Vec<f64>],
+    record: usize,
+) -> Option<Solution> {
+    let candidate = &model.candidates()[effect];
+    let trials = values.iter().filter_map(|values| {
+        let mut point = stated.clone();
+        point.effects.push((effect, candidate.internal(values)));
+        least_squares(model, &point, record, &Free::All, GLANCE)
+    });
+    let best = trials.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    least_squares(model, &best.point, record, &Free::All, LOOK)
 }
 
 /// Finds the effects that `record` asks for; none where nothing can be simulated.
@@ -983,6 +1007,31 @@ mod tests {
         let found = point.effects.iter().map(|(i, q)| q[0] * waves[*i]);
         let noise = 1e-3 * (37.0 * k as f64).sin();
         first + second + other + noise - point.nuisance[0] - found.sum::<f64>()
+    }
+
+    /// `1.5 x` beyond an overlap of 0.9, of a wave whose size is 1: hardly anything passes.
+    fn overlapped(point: &Point, half: usize, k: usize) -> f64 {
+        let x = (0.1 * (half * SAMPLES + k) as f64).sin();
+        let beyond = |overlap: f64| x - x.clamp(-overlap, overlap);
+        let overlap = point.effects.first().map_or(0.0, |(_, q)| q[0].abs());
+        1.5 * beyond(0.9) - (1.0 + 0.1 * point.nuisance[0]) * beyond(overlap)
+    }
+
+    #[test]
+    fn an_effect_that_lets_hardly_anything_pass_is_found_from_what_was_stated() {
+        let mut model = Halves::new(&["overlap"], overlapped);
+        model.candidates[0].starts = vec![vec![40.0], vec![0.5]];
+        let stated = Point {
+            nuisance: vec![0.0],
+            effects: Vec::new(),
+        };
+        let values = model.candidates[0].starts.iter().collect::<Vec<_>>();
+        let found = looked_with(&model, &stated, 0, &values, 2).unwrap().point;
+        assert!(
+            (found.effects[0].1[0].abs() - 0.9).abs() < 0.01,
+            "{found:?}"
+        );
+        assert!((found.nuisance[0] - 5.0).abs() < 0.5, "{found:?}");
     }
 
     #[test]

@@ -93,6 +93,19 @@ fn a_delay_that_lags_make_up_for_is_suspected_with_what_data_leave_open() {
     assert!(sentence.contains("Perhaps, but not for sure"), "{sentence}");
 }
 
+/// An overlap of 0.38 mm, which the second file's commands hardly exceed.
+#[test]
+#[ignore = "slow: a minute"]
+fn an_overlap_is_found_where_commands_hardly_exceed_it() {
+    let found = diagnosed(4000);
+    for part in [&found.as_described, &found.swapped] {
+        let mut effects = part.effects.iter();
+        let overlap = effects.find(|own| own.effect == "dead_band").unwrap();
+        let width = overlap.parameters[0].value;
+        assert!((width - 0.381e-3).abs() < 0.02e-3, "{width}");
+    }
+}
+
 /// An overlap beside a delay of 8.88 ms, after which an orifice's flow leaves half a percent.
 #[test]
 #[ignore = "slow: a minute"]

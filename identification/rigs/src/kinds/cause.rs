@@ -62,6 +62,12 @@ impl Cause {
         fault / (fault + chance)
     }
 
+    /// The ends of its 95 % interval.
+    pub(super) fn ends(&self) -> (f64, f64) {
+        let half = INTERVAL_95 * self.found.standard_error;
+        (self.found.value - half, self.found.value + half)
+    }
+
     /// Widens its interval to what data leave open, from `low` to `high`: the middle may be beside what a fit found.
     pub(super) fn widen(&mut self, (low, high): (f64, f64)) {
         let half = 0.5 * (high - low);

@@ -55,12 +55,13 @@ pub(super) fn causes<M: InParts>(
             standard_error: confirmed.of_the_fit[i],
             ..confirmed.parameters[i].clone()
         };
+        let mut hidden = None;
         if Cause::of(fitted.clone(), stated).is_none()
             && standing.holds
             && let Some(own) = asked.profiled(i)
         {
-            let hidden = beyond(own, i, &fitted, stated, &confirmed.parameters);
-            all.suspected.extend(hidden);
+            hidden = beyond(own, i, &fitted, stated, &confirmed.parameters);
+            all.suspected.extend(hidden.clone());
             fitted.value = own.value(i).unwrap_or(fitted.value);
         }
         let Some(mut told) = Cause::of(fitted, stated) else {
@@ -76,7 +77,12 @@ pub(super) fn causes<M: InParts>(
         }
         let mut as_stated = None;
         match asked.widened(i, &mut told, confirmed, stated.0) {
-            Some(Open::Stated(point)) => as_stated = Some(point),
+            Some(Open::Stated(point)) => {
+                as_stated = Some(point);
+                if let Some(hidden) = &hidden {
+                    told.widen(hidden.ends());
+                }
+            }
             Some(Open::Within(low, high)) if told.is_usual((low, high), stated.1) => {
                 all.suspected.push(told);
                 continue;
@@ -201,7 +207,7 @@ fn beyond<M: InParts>(
         if cause.makes_up(parameters) || !profiled.may_be(i, threshold) {
             return None;
         }
-        let far = profiled.far_end(i, threshold)?;
+        let far = profiled.far_end(i, threshold, stated)?;
         // As far to the near side, if not as stated.
         let best = profiled.value(i)?;
         let near = if profiled.may_be(i, stated) || (best - stated) * side < (far - best) * side {

@@ -130,11 +130,14 @@ impl<M: InParts> Profiled<'_, M> {
         starts
     }
 
-    /// The far end of what is open of parameter `i`, to the side of `value`.
-    pub(super) fn far_end(&self, i: usize, value: f64) -> Option<f64> {
+    /// The far end of what is open of parameter `i`, on the side on which `value` is of what was `stated`. The best may be
+    /// next to `value` or beyond it.
+    pub(super) fn far_end(&self, i: usize, value: f64, stated: f64) -> Option<f64> {
         let best = self.value(i)?;
-        let (far, _) = self.end(QUICK, (i, best), value - best, f64::INFINITY);
-        Some(best + far.copysign(value - best))
+        let first = (value - best).abs().max((value - stated).abs());
+        let first = first.copysign(value - stated);
+        let (far, _) = self.end(QUICK, (i, best), first, f64::INFINITY);
+        Some(best + far.copysign(first))
     }
 
     /// Distance from the `found` value of parameter `i` at which the error begins to tell, on the side of `first`, which
@@ -290,8 +293,12 @@ mod tests {
             }
             let mut own = beside(&measured, &point).unwrap();
             assert!(own.may_be(i, delay) && !own.may_be(i, delay + 0.02));
-            let far = own.far_end(i, delay + 0.02).unwrap();
+            let far = own.far_end(i, delay + 0.02, 0.0).unwrap();
             assert!(far > delay && far < delay + 0.02, "{far}");
+            // As far from a value that is next to the best.
+            let next = own.value(i).unwrap() + 1e-5;
+            let again = own.far_end(i, next, 0.0).unwrap();
+            assert!((again - far).abs() < 0.3 * far, "{again} {far}");
         }
     }
 }

@@ -16,6 +16,10 @@ pub(super) const NEEDED: f64 = 1.1;
 /// And shrinks to this share at most without what makes a prediction worse.
 const BETTER: f64 = 0.95;
 
+/// Error over the output's deviation up to which a model lacks nothing that matters: no simulation, sampling or recorder
+/// is more exact.
+const EXACT: f64 = 1e-3;
+
 /// Most independent samples that a part counts for, halved. No model is exact: a tenth more squared error in
 /// both parts makes a reading less likely by a factor of e, however many samples show it.
 const MOST: f64 = 5.0;
@@ -42,6 +46,8 @@ pub struct Reading {
 /// Errors on either part of a model fitted to the other.
 pub(super) struct Crossed {
     errors: [Vec<f64>; 2],
+    /// The same over the output's deviation.
+    normalised: [f64; 2],
     /// Samples of each file in either part.
     lengths: [Vec<usize>; 2],
     /// Where the model is, fitted to the part that is not predicted.
@@ -82,13 +88,13 @@ impl Crossed {
             fit(model, starts[0], tested[1] as usize)?,
             fit(model, starts[1], tested[0] as usize)?,
         ];
-        let errors = |i: usize| {
+        let used = [0, 1].map(|i| {
             let all = || fit(model, start, EVERYTHING);
-            let used = on_the_other(model, all, &points[i], tested[1 - i]);
-            all_errors(model, &used, tested[i] as usize)
-        };
+            on_the_other(model, all, &points[i], tested[1 - i])
+        });
         Some(Self {
-            errors: [errors(0), errors(1)],
+            errors: [0, 1].map(|i| all_errors(model, &used[i], tested[i] as usize)),
+            normalised: [0, 1].map(|i| model.normalised_error(&used[i], tested[i] as usize)),
             lengths: tested.map(|part| lengths(model, part as usize)),
             points,
             start: start.clone(),
@@ -101,7 +107,7 @@ impl Crossed {
     }
 
     /// Whether what the model has and `without` lacks is needed: no part is clearly predicted better without
-    /// it, and one clearly worse.
+    /// it, and one clearly worse by an error that matters.
     pub(super) fn needs(&self, without: &Self) -> bool {
         let growths = self.growths(without);
         let errors = [&self.errors, &without.errors];
@@ -109,7 +115,8 @@ impl Crossed {
         let clear = |i: usize| clearly_better(bare(i), own(i), &self.lengths[i]);
         let spoils =
             |i: usize| growths[i] < BETTER && clearly_better(own(i), bare(i), &self.lengths[i]);
-        !(0..2).any(spoils) && (0..2).any(|i| growths[i] > NEEDED && clear(i))
+        let is_worse = |i: usize| growths[i] > NEEDED && without.normalised[i] > EXACT && clear(i);
+        !(0..2).any(spoils) && (0..2).any(is_worse)
     }
 
     /// Whether `without`, of which the fits have not ended, will not come near this model.
@@ -259,6 +266,7 @@ mod tests {
         });
         Crossed {
             errors,
+            normalised: sizes,
             lengths: [vec![2000], vec![2000]],
             start: Point::default(),
             points: [Point::default(), Point::default()],
@@ -272,6 +280,9 @@ mod tests {
         assert!(!with.needs(&crossed([1.02, 1.02])));
         assert!(with.needs(&crossed([1.5, 0.99])));
         assert!(!with.needs(&crossed([1.5, 0.8])));
+        // Next to nothing is left either way.
+        let exact = crossed([4e-4, 4e-4]);
+        assert!(!exact.needs(&crossed([9e-4, 9e-4])) && exact.needs(&crossed([9e-4, 1.1e-3])));
     }
 
     #[test]
