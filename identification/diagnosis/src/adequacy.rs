@@ -733,7 +733,11 @@ mod tests {
         };
         let found = motions(&[record(2.0), record(1.0)]);
         assert_eq!(found[0].len(), 40);
-        assert!((found[0][7] / found[1][7] - 4.0).abs() < 1e-9);
+        // The median is that of `one`: 20 samples of 6 and of 3, over the mean square of both records.
+        let mean = 20.0 * (36.0 + 9.0) / 1600.0;
+        for (own, size) in found.iter().zip([6.0, 3.0]) {
+            assert!((own[7] / (20.0 * size * size / mean) - 1.0).abs() < 1e-9);
+        }
         assert_eq!(found[0][8], 0.0);
     }
 
