@@ -157,9 +157,7 @@ impl Link {
                 Ok(0) => return Err(LinkError::Half { got, expected }),
                 Ok(count) => {
                     got += count;
-                    if got < expected {
-                        since = Instant::now();
-                    }
+                    since = Instant::now();
                 }
                 Err(error) if is_a_look(&error) => {
                     if self.interrupt.is_some_and(|i| i.load(Ordering::Relaxed)) {
@@ -352,6 +350,23 @@ mod tests {
         );
         let closed = link.receive(&mut message);
         assert!(matches!(closed, Err(LinkError::Closed)), "{closed:?}");
+    }
+
+    /// Four pieces in 1.6 s, with a limit of 1 s.
+    #[test]
+    fn a_silence_begins_with_the_last_piece_of_a_message() {
+        let (mut link, mut peer) = connected();
+        link.limit(Duration::from_secs(1)).unwrap();
+        let slow = std::thread::spawn(move || {
+            for piece in 1..=4 {
+                std::thread::sleep(Duration::from_millis(400));
+                peer.write_all(&[piece; 2]).unwrap();
+            }
+        });
+        let mut message = [0; 8];
+        link.receive(&mut message).unwrap();
+        assert_eq!(message, [1, 1, 2, 2, 3, 3, 4, 4]);
+        slow.join().unwrap();
     }
 
     #[test]

@@ -116,6 +116,8 @@ mod tests {
         }
         assert_eq!(trips.longest_s, 1e-3);
         assert_eq!(trips.above(1e-3), 0);
+        // Bins end at 501 us, 562 us and 631 us: those from 562 us on are longer for sure.
+        assert_eq!(trips.above(500e-6), 1000 - 562);
         let counted: u64 = trips.histogram().iter().map(|bin| bin.count).sum();
         assert_eq!(counted, 1000);
         trips.add(Duration::from_millis(41));
