@@ -449,6 +449,19 @@ mod tests {
             (rule.damping, rule.lowest_ratio, rule.search.band_hz),
             (0.03, 1.0, [1.0, 30.0])
         );
+        // Frequencies in another unit; those of the band are in Hz.
+        let text = WHOLE.replace("\"Hz\"", "\"kHz\"");
+        let (head, _) = text.split_once("points").unwrap();
+        let points = "points = [[5e-4, 2], [2e-3, 9.80665], [0.01, 9.80665], [0.03, 4]]\n";
+        let other = file(".toml", &format!("{head}{points}"));
+        let other = load(&other.display().to_string(), &[]).unwrap();
+        for frequency in [1.0, 5.0, 20.0] {
+            let (found, wanted) = (other.required(frequency), rule.required(frequency));
+            assert!(
+                (found / wanted - 1.0).abs() < 1e-12,
+                "{frequency} Hz: {found}"
+            );
+        }
         let halved = load(&path, &set(&["level=0.5", "damping_percent=5"])).unwrap();
         assert!((halved.required(5.0) - 0.5).abs() < 1e-12 && halved.damping == 0.05);
         for (was, now, expected) in [

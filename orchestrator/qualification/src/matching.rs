@@ -508,6 +508,40 @@ mod tests {
         assert!(low >= 1.0 && high <= 1.15, "{low} {high}");
     }
 
+    /// Lines of 1 Hz and 20 Hz are in the middle of the tapers over the logarithm of the frequency.
+    #[test]
+    fn histories_are_those_of_lines_that_fade_at_the_ends_of_the_band() {
+        let (length, dt) = (2000, 0.005);
+        let rule = Rule {
+            band_hz: [1.0 / 0.75_f64.sqrt(), 20.0 / 1.25_f64.sqrt()],
+            ..Rule::ac156(1.0, 0.0, false)
+        };
+        for (line, part) in [(8, 0.0), (10, 0.5), (30, 1.0), (200, 0.5), (230, 0.0)] {
+            let mut lines = vec![Complex64::default(); length / 2 + 1];
+            lines[line] = Complex64::new(0.5 * length as f64, 0.0);
+            let series = Series {
+                lines,
+                length,
+                samples: 1001,
+                dt,
+                edge: 1.0,
+            };
+            let [x, v, a] = series.histories(&rule, &[5.0], &[2.0]);
+            // Lines are 0.1 Hz apart; the envelope is 1 from 1 s to 4 s.
+            let omega = TAU * 0.1 * line as f64;
+            for n in [200, 333, 500, 800] {
+                let (sin, cos) = (omega * dt * n as f64).sin_cos();
+                let of = [-cos / (omega * omega), sin / omega, cos];
+                for (found, wanted) in [x[n], v[n], a[n]].iter().zip(of) {
+                    assert!(
+                        (found - 2.0 * part * wanted).abs() < 1e-9,
+                        "line {line}, sample {n}: {found}"
+                    );
+                }
+            }
+        }
+    }
+
     #[test]
     fn axes_are_not_alike() {
         let rule = Rule {
