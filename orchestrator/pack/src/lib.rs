@@ -172,6 +172,20 @@ mod tests {
     }
 
     #[test]
+    fn the_notices_of_the_program_are_those_of_all_that_it_is_linked_with() {
+        let text = notices_of_the_program().unwrap();
+        // Linked directly and by a dependency; linked into tests or run at a build only.
+        for (name, is_linked) in [
+            ("clap", true),
+            ("nalgebra", true),
+            ("proptest", false),
+            ("syn", false),
+        ] {
+            assert_eq!(text.contains(&format!("\n{name} ")), is_linked, "{name}");
+        }
+    }
+
+    #[test]
     fn packed_fmus_are_below_the_workspace() {
         let root = workspace_root().unwrap();
         assert!(root.join("fmus/kit/Cargo.toml").is_file());
