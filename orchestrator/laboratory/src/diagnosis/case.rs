@@ -194,3 +194,36 @@ fn in_closed_loop(
         &after,
     )?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_fmu_is_found_by_its_name_and_in_version_3() {
+        let fmu = |name: &str, version: FmiVersion| PackedFmu {
+            name: name.into(),
+            version,
+            path: format!("{name} {version:?}").into(),
+        };
+        let all = [
+            fmu("Specimen", FmiVersion::V2),
+            fmu("Instrumentation", FmiVersion::V3),
+            fmu("Specimen", FmiVersion::V3),
+            fmu("ShakeTable", FmiVersion::V2),
+        ];
+        assert_eq!(find(&all, "Specimen"), Some(&all[2]));
+        assert_eq!(find(&all, "ShakeTable"), None);
+        assert_eq!(find(&all, "ThreeVariableControl"), None);
+    }
+
+    #[test]
+    fn an_fmu_of_the_results_is_in_the_folder_of_its_version() {
+        let own = PackedFmu {
+            name: "Specimen".into(),
+            version: FmiVersion::V2,
+            path: "elsewhere/one.fmu".into(),
+        };
+        assert_eq!(name(&own), "fmi2/Specimen.fmu");
+    }
+}

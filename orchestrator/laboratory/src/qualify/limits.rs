@@ -224,6 +224,16 @@ mod tests {
     }
 
     #[test]
+    fn of_equal_peaks_the_first_is_told() {
+        let motion = motion(&[0.0, -0.04, 0.04], &[0.0; 3], &[0.0, 2.0, -2.0]);
+        let all = limits(None).used(&motion, 1.0);
+        assert_eq!(share(&all, "displacement"), (0.4, 0.002));
+        assert_eq!(share(&all, "acceleration"), (0.2, 0.002));
+        // What is not used at all is so from the beginning.
+        assert_eq!(share(&all, "velocity"), (0.0, 0.0));
+    }
+
+    #[test]
     fn valve_and_flow_are_used_by_velocity_and_load() {
         let own = Hydraulics {
             area: 0.01,
