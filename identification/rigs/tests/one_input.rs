@@ -126,9 +126,8 @@ fn noise_on_the_recorded_command_leaves_no_bias_or_is_told() {
     }
 }
 
-#[test]
-fn a_rig_with_a_loop_of_its_own_is_found_from_reference_and_displacement() {
-    // 1.02 / ((0.003 s + 1)(s/50 + 1)), 4.5 ms late, at 1 kHz.
+/// 1.02 / ((0.003 s + 1)(s/50 + 1)), 4.5 ms late, at 1 kHz, with `noise_of_reference` (m) on what is recorded of it.
+fn press(noise_of_reference: f64) -> Recording {
     let period = 0.001;
     let wanted = reference(5);
     let (mut u, mut x) = (0.0f64, 0.0f64);
@@ -145,9 +144,37 @@ fn a_rig_with_a_loop_of_its_own_is_found_from_reference_and_displacement() {
             x += step * 50.0 * (u - x);
         }
     }
-    let channels = vec![(Channel::Reference, wanted), (Channel::Displacement, shown)];
-    let recording = Recording::new("press", period, channels).unwrap();
-    let found = identify(&[recording], 0.75).unwrap();
+    let recorded = wanted.iter().enumerate();
+    let recorded = recorded.map(|(k, r)| r + noise_of_reference * noise(5, 3, k));
+    let channels = vec![
+        (Channel::Reference, recorded.collect()),
+        (Channel::Displacement, shown),
+    ];
+    Recording::new("press", period, channels).unwrap()
+}
+
+#[test]
+fn a_little_noise_on_a_reference_is_measured_and_not_warned_of() {
+    let (_, size) = mean_and_deviation(&reference(5));
+    let part = 0.1 * size;
+    let found = identify(&[press(part)], 0.75).unwrap();
+    assert!(
+        (found.noise[0] / part - 1.0).abs() < 0.05,
+        "{:?}",
+        found.noise
+    );
+    let g0 = found.model.response(1e-3, found.period).re;
+    assert!((g0 / 1.02 - 1.0).abs() < 2e-3, "{g0}");
+    let [warning] = &found.warnings[..] else {
+        panic!("{:?}", found.warnings)
+    };
+    assert!(warning.starts_with("command and displacement alone do not determine mass"));
+}
+
+#[test]
+fn a_rig_with_a_loop_of_its_own_is_found_from_reference_and_displacement() {
+    let period = 0.001;
+    let found = identify(&[press(0.0)], 0.75).unwrap();
     assert_eq!(found.input, Channel::Reference);
     assert!(!found.structure.integrates);
     let g0 = found.model.response(1e-3, period).re;
@@ -197,12 +224,20 @@ fn a_nonlinear_rig_that_was_swept_is_not_given_a_drift_below_its_sweep() {
 #[test]
 fn recordings_without_a_command_are_refused() {
     let channels = vec![(Channel::Displacement, reference(1))];
-    let recording = Recording::new("blind", PERIOD, channels).unwrap();
-    let said = identify(&[recording], 0.75).unwrap_err().to_string();
+    let blind = Recording::new("blind", PERIOD, channels).unwrap();
+    let said = |all: &[Recording]| identify(all, 0.75).unwrap_err().to_string();
+    let alone = said(std::slice::from_ref(&blind));
     assert!(
-        said.contains("valve_command") && said.contains("reference"),
-        "{said}"
+        alone.contains("valve_command") && alone.contains("reference"),
+        "{alone}"
     );
+    // Of several the one that has none is named; what is in one of two only is not in all.
+    let whole = valve_driven(0.0, true);
+    let driven = whole.clone().without(Channel::Reference);
+    let second = said(&[driven.clone(), blind]);
+    assert!(second.contains("blind"), "{second}");
+    let different = said(&[driven, whole.without(Channel::ValveCommand)]);
+    assert!(different.contains("different commands"), "{different}");
 }
 
 /// A table on a spring, `x' = 0.08 (u + d) - 2 x`, under `u = gain (r(t - 20 ms) - x)`, with a slow

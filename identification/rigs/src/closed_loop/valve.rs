@@ -626,6 +626,33 @@ mod tests {
     use super::*;
     use recordings::Channel;
 
+    /// Lags of 4 ms and 1 ms in a row, after steps of 1 V and -3 V that arrive 2.3 samples late.
+    #[test]
+    fn the_spool_answers_steps_in_closed_form_after_its_delay() {
+        const PERIOD: f64 = 2e-3;
+        let (slow, fast) = (4e-3, 1e-3);
+        let rig = HydraulicRig {
+            spool_lag: slow + fast,
+            spool_inertia: slow * fast,
+            command_delay: 2.3 * PERIOD,
+            ..super::super::start::empty()
+        };
+        let command: Vec<f64> = (0..40).map(|k| if k < 10 { 1.0 } else { -2.0 }).collect();
+        let answer = |t: f64| {
+            let rest = slow * (-t / slow).exp() - fast * (-t / fast).exp();
+            if t > 0.0 {
+                1.0 - rest / (slow - fast)
+            } else {
+                0.0
+            }
+        };
+        for (k, found) in spool(&rig, &command, PERIOD).iter().enumerate() {
+            let t = (k as f64 - 2.3) * PERIOD;
+            let expected = answer(t) - 3.0 * answer(t - 10.0 * PERIOD);
+            assert!((found - expected).abs() < 1e-9, "{k}: {found} {expected}");
+        }
+    }
+
     /// The spool with its delay, at frequencies of a table's motion.
     #[test]
     fn what_delay_and_spool_exchange_hardly_shows() {

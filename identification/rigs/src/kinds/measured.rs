@@ -704,5 +704,15 @@ mod tests {
         let none = measured.without(&origin, 2).unwrap();
         step[2] = 1.0;
         assert_eq!(values(&measured.moved(&none, &step))[2].value, 0.0);
+        // A gain has vanished below e^-5 of what was stated.
+        let mut small = origin.clone();
+        for (power, comes_back) in [(-4.9, false), (-5.1, true)] {
+            small.nuisance[0] = power * 20.0 / 5.0;
+            let found = values(&small)[0].value;
+            assert!((found / 20.0 / f64::exp(power) - 1.0).abs() < 1e-12);
+            let restored = measured.restored(&small);
+            let expected = if comes_back { &origin } else { &small };
+            assert_eq!(restored.nuisance, expected.nuisance);
+        }
     }
 }

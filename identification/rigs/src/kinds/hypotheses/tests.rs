@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Hypotheses, extended};
-use crate::kinds::{Description, Rig, RigRecording, Values, of_kind};
+use crate::kinds::{Description, KINDS, Rig, RigRecording, Values, of_kind};
 use recordings::{Channel, Recording};
 
 fn parsed(text: &str) -> Hypotheses {
@@ -267,6 +267,69 @@ parameters.pitch = { start = 2, range = [1, 4], unit = "mm" }
         let exact = 100.0 * speeds[k] + 20.0 * (std::f64::consts::TAU * x / 2e-3).sin();
         assert!((force - exact).abs() < 1e-9, "{force} {exact}");
     }
+}
+
+const SCALE: &str = r#"
+[scale]
+at = "output"
+value = "u * (1 + a)"
+sentence = "the transducer shows {a} more"
+parameters.a = { start = 0.1, range = [-0.5, 0.5], unit = "1" }
+"#;
+
+#[test]
+fn all_but_the_effects_of_a_kind_stays_as_it_is() {
+    for base in KINDS {
+        let rig = extended(base, &parsed(SCALE), Path::new("")).unwrap();
+        let facts = |of: &dyn Rig| {
+            let columns = (of.inputs(), of.optional(), of.output(), of.also());
+            let parameters = (of.parameters(), of.about_parameters(), of.defaults());
+            let is = [
+                of.is_hysteretic(),
+                of.is_path(),
+                of.begins_anew(),
+                of.is_scaled(),
+            ];
+            let search = (of.session(), of.screened(), of.said_by(), of.causes());
+            let rest = (of.kind(), of.limits(), of.places());
+            (columns, parameters, is, search, rest)
+        };
+        assert_eq!(facts(rig), facts(base));
+        let names = |of: &dyn Rig| -> Vec<&str> {
+            let all = of.effects().into_iter();
+            all.map(|effect| effect.candidate.effect).collect()
+        };
+        assert_eq!(names(rig), [names(base), vec!["scale"]].concat());
+    }
+}
+
+/// `x' = 40/s (r - x)`, integrated in a hundred steps per sample.
+#[test]
+fn a_loop_with_an_own_effect_is_estimated_from_its_equation() {
+    let base = of_kind("closed_loop_actuator").unwrap();
+    let rig = extended(base, &parsed(SCALE), Path::new("")).unwrap();
+    let (period, steps) = (0.005, 100);
+    let mut x = 0.0;
+    let [mut commands, mut shown] = [Vec::new(), Vec::new()];
+    for k in 0..1200 {
+        commands.push(command(k, period));
+        shown.push(x);
+        for i in 0..steps {
+            let share = (f64::from(i) + 0.5) / f64::from(steps);
+            let now = (1.0 - share) * command(k, period) + share * command(k + 1, period);
+            x += period / f64::from(steps) * 40.0 * (now - x);
+        }
+    }
+    let channels = vec![(rig.inputs()[0], commands), (rig.output(), shown)];
+    let recording = Recording::new("record", period, channels).unwrap();
+    let recording = RigRecording::new(recording, rig.inputs(), rig.output());
+    let places: Vec<usize> = (0..1200).collect();
+    let stated = [&[25.0], &LOOP[1..]].concat();
+    let found = rig.estimated(&recording, &places, &stated).unwrap();
+    assert!((found[0] / 40.0 - 1.0).abs() < 0.02, "{found:?}");
+    assert!((found[2] - 1.0).abs() < 0.01, "{found:?}");
+    // The lag of the command is not in the equation.
+    assert_eq!(found[1], LOOP[1]);
 }
 
 #[test]
