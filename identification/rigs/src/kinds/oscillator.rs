@@ -440,3 +440,124 @@ fn at_stair(between: &[f64], sample: usize) -> f64 {
     let place = (sample * PLACES).min(between.len().saturating_sub(1));
     between[place]
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::super::table::EffectTable;
+    use super::*;
+
+    const NOMINAL: Nominal = Nominal {
+        mass: 2.0,
+        damping: 3.0,
+        stiffness: 50.0,
+        offset: 1.0,
+    };
+
+    /// Rates of `state` under a force of 7 N, with 0.5 N added on the mass.
+    fn rates(state: State, set: impl Fn(&mut Effects)) -> State {
+        let all = Effects::table().into_iter();
+        let off: Vec<f64> = all.flat_map(|own| own.off).collect();
+        let mut effects = Effects::from_values(&off).unwrap();
+        set(&mut effects);
+        Law::new(&NOMINAL, &effects).slope(&state, 7.0, 0.5)
+    }
+
+    fn close(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+
+    /// At -0.3 m and 0.8 m/s, in N.
+    #[test]
+    fn an_effect_resists_with_its_formula_beside_spring_and_damper() {
+        let cases: [(fn(&mut Effects), f64); 11] = [
+            (|_| (), 0.0),
+            (|e| e.cubic_stiffness.stiffness = 4.0, 4.0 * -0.027),
+            (|e| e.quadratic_stiffness.stiffness = 4.0, 4.0 * 0.09),
+            (|e| e.asymmetric_stiffness.asymmetry = 0.2, 50.0 * 0.2 * 0.3),
+            (
+                |e| {
+                    e.stops = Stops {
+                        stiffness: 100.0,
+                        gap: 0.25,
+                    };
+                },
+                -100.0 * 0.05,
+            ),
+            (
+                |e| {
+                    e.stops = Stops {
+                        stiffness: 100.0,
+                        gap: 0.35,
+                    };
+                },
+                0.0,
+            ),
+            // The spring bears for 0.2 m, or does not bear at all.
+            (|e| e.free_play.gap = 0.2, 50.0 * 0.1),
+            (|e| e.free_play.gap = 0.8, 50.0 * 0.3),
+            (
+                |e| {
+                    e.coulomb_friction = CoulombFriction {
+                        force: 2.0,
+                        rounding: 0.6,
+                    };
+                },
+                2.0 * 0.8,
+            ),
+            (|e| e.quadratic_damping.damping = 1.5, 1.5 * 0.64),
+            (|e| e.displacement_damping.damping = 10.0, 10.0 * 0.09 * 0.8),
+        ];
+        for (n, (set, more)) in cases.into_iter().enumerate() {
+            let found = rates([-0.3, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0], set);
+            assert_eq!(found[0], 0.8, "{n}");
+            close(found[1], (7.5 + 1.0 + 50.0 * 0.3 - 3.0 * 0.8 - more) / 2.0);
+            assert_eq!(found[2..], [0.0; 5], "{n}");
+        }
+    }
+
+    /// `z' = 20 v (1 - (5 sgn(v z) + 2) |z| / 20)` at 1.2 N.
+    #[test]
+    fn a_force_with_memory_grows_where_it_is_loaded_less_than_where_it_is_unloaded() {
+        let of = |v: f64, exponent: f64| {
+            let set = |e: &mut Effects| {
+                e.hysteresis = Hysteresis {
+                    stiffness: 20.0,
+                    dissipation: 5.0,
+                    hardening: 2.0,
+                    exponent,
+                };
+            };
+            let [_, rate, memory, ..] = rates([0.0, v, 1.2, 0.0, 0.0, 0.0, 0.0], set);
+            close(rate, (7.5 + 1.0 - 3.0 * v - 1.2) / 2.0);
+            memory
+        };
+        close(of(0.8, 1.0), 16.0 * (1.0 - 7.0 * 0.06));
+        close(of(-0.8, 1.0), -16.0 * (1.0 + 3.0 * 0.06));
+        close(of(0.8, 2.0), 16.0 * (1.0 - (7.0 * 0.06_f64).powi(2)));
+    }
+
+    #[test]
+    fn lags_and_a_second_mass_have_states_of_their_own() {
+        let state = [-0.3, 0.8, 0.0, 4.0, -0.2, -0.1, 0.3];
+        let resisting = -50.0 * 0.3 + 3.0 * 0.8;
+        let force = rates(state, |e| e.force_lag.time_constant = 0.1);
+        close(force[3], (7.0 - 4.0) / 0.1);
+        close(force[1], (4.5 + 1.0 - resisting) / 2.0);
+        let sensor = rates(state, |e| e.sensor_lag.time_constant = 0.05);
+        close(sensor[4], (-0.3 + 0.2) / 0.05);
+        close(sensor[1], (7.5 + 1.0 - resisting) / 2.0);
+        // A quarter of the mass at 6 rad/s with a tenth of critical damping: 18 N/m and 0.6 N s/m.
+        let second = rates(state, |e| {
+            e.second_mode = SecondMode {
+                share: 0.25,
+                frequency: 6.0,
+                damping_ratio: 0.1,
+            };
+        });
+        let pull = 18.0 * 0.2 - 0.6 * 0.5;
+        close(second[1], (7.5 + 1.0 - resisting + pull) / 1.5);
+        assert_eq!(second[5], 0.3);
+        close(second[6], -pull / 0.5);
+    }
+}
