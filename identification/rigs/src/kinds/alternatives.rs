@@ -276,10 +276,61 @@ pub(super) fn least_needed<M: InParts>(
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::super::measured::Measured;
-    use super::super::{Measurement, of_kind};
+    use super::super::{Measurement, RigRecording, of_kind};
     use super::*;
+    use nalgebra::Complex;
+    use recordings::{Channel, Recording};
     use units::vocabulary;
+
+    /// The steady motion of 10 kg on 9000 N/m with a damper (N s/m) under tones of 10 N, and noise of a hundredth.
+    fn shaken(damping: f64) -> RigRecording {
+        let force = Channel::Other {
+            name: "force",
+            unit: "N",
+        };
+        let tones = [1.1, 1.9, 2.7, 3.6, 5.9, 7.3];
+        let [mut forces, mut shown] = [Vec::new(), Vec::new()];
+        for k in 0..3000 {
+            let t = 0.005 * f64::from(k);
+            let noise = 4e-5 * (91.7 * f64::from(k)).sin() * (13.31 * f64::from(k)).cos();
+            let (mut sum, mut x) = (0.0, noise);
+            for frequency in tones {
+                let omega = TAU * frequency;
+                let tone = Complex::from_polar(10.0, omega * t);
+                sum += tone.re;
+                x += (tone / Complex::new(9000.0 - 10.0 * omega * omega, damping * omega)).re;
+            }
+            forces.push(sum);
+            shown.push(x);
+        }
+        let channels = vec![(force, forces), (Channel::Displacement, shown)];
+        let recording = Recording::new("shaken", 0.005, channels).unwrap();
+        let mut own = RigRecording::new(recording, &[force], Channel::Displacement);
+        own.left_out[1500..].fill(true);
+        own
+    }
+
+    #[test]
+    fn a_model_goes_without_its_damper_where_there_is_none() {
+        let rig = of_kind("oscillator").unwrap();
+        for (damping, is_idle) in [(0.0, true), (60.0, false)] {
+            let measurement = Measurement {
+                recordings: vec![shaken(damping)],
+            };
+            let stated = [(10.0, 0.0), (60.0, 60.0), (9000.0, 0.0), (0.0, 0.0)];
+            let measured = Measured::new(rig, &measurement, stated.to_vec());
+            let point = looked(&measured, &measured.origin(), EVERYTHING).unwrap();
+            let near = nearly_without(&measured, &point);
+            let found = near
+                .iter()
+                .map(|own| measured.parameters(own, &[])[0].value);
+            let expected = if is_idle { vec![0.0] } else { Vec::new() };
+            assert_eq!(found.collect::<Vec<_>>(), expected, "{damping} N s/m");
+        }
+    }
 
     #[test]
     fn an_effect_stands_in_for_one_that_it_does_not_list_but_that_lists_it() {
