@@ -460,3 +460,157 @@ impl Residuals for Equations {
         true
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RIG: HydraulicRig = HydraulicRig {
+        spool_lag: 5e-3,
+        spool_inertia: 7e-6,
+        force_rate: 2e4,
+        oil_stiffness: 2e5,
+        leakage_rate: 4.0,
+        seal_damping: 900.0,
+        seal_friction: 13.0,
+        mass: 20.0,
+        damping: 40.0,
+        stiffness: 4000.0,
+        specimen_mass: 6.0,
+        command_delay: 3e-3,
+        accelerometer_delay: 1e-3,
+        load_cell_delay: 5e-4,
+        accelerometer_scale: 1.02,
+    };
+
+    fn close(found: Complex<f64>, expected: Complex<f64>) {
+        let off = (found - expected).norm();
+        assert!(off < 1e-9 * expected.norm(), "{found} {expected}");
+    }
+
+    #[test]
+    fn responses_are_those_of_valve_oil_and_table() {
+        let (omega, period) = (5.0, 0.02);
+        let s = Complex::new(0.0, omega);
+        // 23 kg.
+        close(
+            RIG.table(s, 3.0),
+            Complex::new(4000.0 - 23.0 * 25.0, 40.0 * omega),
+        );
+        // K / (4 + 5 i) = K (4 - 5 i) / 41.
+        let (real, imaginary) = (2e5 * 4.0 / 41.0 + 900.0, -2e5 * 5.0 / 41.0);
+        close(
+            RIG.compliance_path(s),
+            Complex::new(-omega * imaginary, omega * real),
+        );
+        // A hold is late by half of a sample and lets sin(x) / x through.
+        let half = 0.5 * omega * period;
+        let hold = Complex::from_polar(half.sin() / half, -half - omega * 3e-3);
+        close(
+            RIG.spool(s, period),
+            hold / Complex::new(1.0 - 7e-6 * 25.0, 5e-3 * omega),
+        );
+    }
+
+    /// The channels of a motion, as sensors show them.
+    #[test]
+    fn the_channels_of_a_motion_satisfy_all_equations() {
+        let (s, period, payload) = (Complex::new(0.0, 30.0), 2e-3, 3.0);
+        let x = Complex::new(1e-3, 2e-4);
+        let specimen = Complex::new(-0.7, 0.4);
+        let force = x * (23.0 * s * s + 40.0 * s + 4000.0) + specimen * 6.0;
+        let opening = Complex::new(0.02, -0.01);
+        // The friction is off by what its shape changes.
+        let shape = [0.1, -0.2, 0.3, 0.05, -0.4];
+        let slopes: [Complex<f64>; SHAPE] =
+            std::array::from_fn(|i| Complex::new(0.3 * i as f64, 0.1));
+        let sign = Complex::new(0.8, 0.5);
+        let changes = slopes.iter().zip(&shape).map(|(slope, by)| slope * *by);
+        let friction = 13.0 * (sign + changes.sum::<Complex<f64>>());
+        let oil = 2e4 / (s + 4.0);
+        let pushed = force + x * s * (2e5 / (s + 4.0) + 900.0) + friction;
+        let mut channels = [Complex::ZERO; CHANNELS];
+        channels[COMMAND] = (pushed / oil - opening) / RIG.spool(s, period);
+        channels[DISPLACEMENT] = x;
+        channels[ACCELERATION] = 1.02 * s * s * x * (-s * 1e-3).exp();
+        channels[SPECIMEN] = 1.02 * specimen * (-s * 1e-3).exp();
+        channels[FORCE] = force * (-s * 5e-4).exp();
+        channels[SIGN] = sign;
+        channels[SLOPES..OPENING].copy_from_slice(&slopes);
+        channels[OPENING] = opening;
+        let rows = coefficients(&RIG, &shape, payload, s, period);
+        let largest = [s * s * x, force, force];
+        for (row, largest) in rows.iter().zip(largest) {
+            let sum: Complex<f64> = row.iter().zip(&channels).map(|(c, z)| c * z).sum();
+            assert!(sum.norm() < 1e-9 * largest.norm(), "{sum} of {largest}");
+        }
+        close(rows[0][ACCELERATION] * channels[ACCELERATION], s * s * x);
+        close(rows[1][FORCE] * channels[FORCE], force);
+        close(rows[2][FORCE] * channels[FORCE], force);
+    }
+
+    #[test]
+    fn coordinates_are_logarithms_of_what_is_positive() {
+        let here = RIG.coordinates();
+        let names: Vec<&str> = (0..PARAMETERS)
+            .filter(|i| here[*i] != <[f64; PARAMETERS]>::from(RIG)[*i])
+            .map(|i| NAMES[i])
+            .collect();
+        assert_eq!(
+            names,
+            ["force rate", "oil stiffness", "leakage rate", "table mass"]
+        );
+        let values = |at: &[f64]| <[f64; PARAMETERS]>::from(HydraulicRig::at(at).unwrap());
+        let (back, slopes) = (values(&here), RIG.slopes());
+        for i in 0..PARAMETERS {
+            assert!((back[i] / <[f64; PARAMETERS]>::from(RIG)[i] - 1.0).abs() < 1e-12);
+            let beside = |by: f64| {
+                let mut moved = here;
+                moved[i] += by;
+                values(&moved)[i]
+            };
+            let slope = (beside(1e-4) - beside(-1e-4)) / 2e-4;
+            assert!((slope / slopes[i] - 1.0).abs() < 1e-6, "{}", NAMES[i]);
+        }
+        assert!(RIG.is_sound() && HydraulicRig::at(&here[1..]).is_none());
+        for i in [2, 3, 4, 7, 14] {
+            for broken in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+                let mut values = <[f64; PARAMETERS]>::from(RIG);
+                values[i] = broken;
+                assert!(!HydraulicRig::from(values).is_sound(), "{}", NAMES[i]);
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_experiment_has_no_payload_and_each_other_its_own() {
+        let mut values = vec![0.0; PARAMETERS + SHAPE];
+        values.extend([5.0, 7.0]);
+        let all = [0, 1, 2, 3].map(|index| payload(&values, index));
+        assert_eq!(all, [Some(0.0), Some(5.0), Some(7.0), None]);
+    }
+
+    /// Two equations that share a channel: the second less the first is its own.
+    #[test]
+    fn residuals_are_whitened_one_after_the_other() {
+        let real = |values: [f64; 9]| {
+            DMatrix::from_row_slice(3, 3, &values.map(|value| Complex::new(value, 0.0)))
+        };
+        let rows = real([2.0, 0.0, 0.0, 2.0, 3.0, 0.0, 0.0, 0.0, 4.0]);
+        let noise = real([0.25, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 4.0]);
+        let whitener = Whitener::new(&rows, &noise).unwrap();
+        let own = [(1.0, 0.5), (4.0, -2.5), (16.0, 8.0)];
+        let found = whitener.apply(own.map(|(re, im)| Complex::new(re, im)));
+        // Deviations of 1, 3 and 8, of which each part has the root of a half.
+        for (found, (re, im)) in found
+            .unwrap()
+            .iter()
+            .zip([(1.0, 0.5), (1.0, -1.0), (2.0, 1.0)])
+        {
+            let expected = Complex::new(re, im) * std::f64::consts::SQRT_2;
+            assert!((found - expected).norm() < 1e-6, "{found} {expected}");
+        }
+        let silent = real([0.0; 9]);
+        assert!(Whitener::new(&rows, &silent).is_none());
+    }
+}

@@ -238,3 +238,105 @@ impl Simulation {
         self.advance_seal(owed);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::Complex;
+
+    use super::*;
+
+    const SHAPE: SealShape = SealShape {
+        presliding: 2e-5,
+        excess: 0.2,
+        stribeck_velocity: 4e-3,
+        sharpness: 3.0,
+        relaxation: 1e-3,
+    };
+
+    /// A rig that forgets how it began within a tenth of a second, under a tone of 5 Hz.
+    #[test]
+    fn a_tone_is_answered_by_the_response_of_valve_oil_table_and_specimen() {
+        const PERIOD: f64 = 2e-3;
+        let rig = HydraulicRig {
+            spool_lag: 5e-3,
+            spool_inertia: 7e-6,
+            force_rate: 2e4,
+            oil_stiffness: 2e5,
+            leakage_rate: 100.0,
+            seal_damping: 900.0,
+            seal_friction: 0.0,
+            mass: 20.0,
+            damping: 40.0,
+            stiffness: 4e5,
+            specimen_mass: 60.0,
+            command_delay: 1.7 * PERIOD,
+            accelerometer_delay: 0.6 * PERIOD,
+            load_cell_delay: 0.0,
+            accelerometer_scale: 1.02,
+        };
+        let specimen = SpecimenOverMass::elastic(20.0, 900.0);
+        let omega = TAU * 5.0;
+        for carried in [false, true] {
+            let mut own = Simulation::new(rig, SHAPE, 3.0, carried.then_some(specimen), PERIOD);
+            let mut found = [Complex::new(0.0_f64, 0.0); 4];
+            for k in 0..2000 {
+                let phase = omega * PERIOD * f64::from(k);
+                let shown = own.shown();
+                if k >= 1000 {
+                    let all = [
+                        shown.displacement,
+                        shown.acceleration,
+                        shown.actuator_force,
+                        shown.specimen_acceleration,
+                    ];
+                    for (sum, value) in found.iter_mut().zip(all) {
+                        *sum += Complex::from_polar(value / 500.0, -phase);
+                    }
+                }
+                own.step(phase.cos());
+            }
+            let s = Complex::new(0.0, omega);
+            let half = 0.5 * omega * PERIOD;
+            let late = -half - omega * 1.7 * PERIOD;
+            let spool =
+                Complex::from_polar(half.sin() / half, late) / (1.0 + s * 5e-3 + s * s * 7e-6);
+            // The specimen's acceleration over the table's displacement.
+            let spring = s * 20.0 + 900.0;
+            let above = if carried {
+                spring * s * s / (s * s + spring)
+            } else {
+                Complex::ZERO
+            };
+            let load = s * s * 23.0 + s * 40.0 + 4e5 + above * 60.0;
+            let oil = s * (2e5 / (s + 100.0) + 900.0);
+            let x = spool * 2e4 / (s + 100.0) / (load + oil);
+            let sensor = 1.02 * (-s * 0.6 * PERIOD).exp();
+            let expected = [x, s * s * x * sensor, load * x, above * x * sensor];
+            for (found, expected) in found.iter().zip(expected) {
+                let off = (found - expected).norm();
+                assert!(off <= 2e-3 * expected.norm(), "{found} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rig_at_rest_begins_where_it_is_put_and_longer_steps_change_little() {
+        let rig = HydraulicRig {
+            spool_lag: 4.8e-3,
+            spool_inertia: 7e-6,
+            ..super::super::start::empty()
+        };
+        let mut own = Simulation::new(rig, SHAPE, 0.0, None, 1e-3).starting_at(0.02);
+        own.step(0.0);
+        assert_eq!(own.shown().displacement, 0.02);
+        let after = |longest: f64| {
+            let mut own = Simulation::new(rig, SHAPE, 0.0, None, 0.01).with_steps_of(longest);
+            (0..50).for_each(|_| own.step(1.0));
+            own.shown().displacement
+        };
+        let off = (after(1e-3) / after(1e-4) - 1.0).abs();
+        assert!(off > 0.0 && off < 1e-4, "{off}");
+    }
+}

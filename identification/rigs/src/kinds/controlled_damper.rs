@@ -195,3 +195,154 @@ impl Equations for ControlledDamper {
         channels
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::super::table::EffectTable;
+    use super::*;
+    use recordings::Recording;
+
+    const PERIOD: f64 = 0.01;
+    const NOMINAL: Nominal = Nominal {
+        damping: 100.0,
+        stiffness: 500.0,
+        offset: 3.0,
+    };
+    const PLACES: [f64; 6] = [0.0, 0.01, 0.03, 0.02, -0.01, -0.02];
+    const SPEEDS: [f64; 6] = [0.1, 0.4, -0.2, -0.3, 0.2, 0.5];
+
+    /// The force at `x` and `v` under a command of 1 V, and of 3 V from the second sample on.
+    fn force(x: &[f64], v: &[f64], session: &Session, set: impl Fn(&mut Effects)) -> Vec<f64> {
+        let all = Effects::table().into_iter();
+        let off: Vec<f64> = all.flat_map(|own| own.off).collect();
+        let mut effects = Effects::from_values(&off).unwrap();
+        set(&mut effects);
+        let mut command = vec![3.0; x.len()];
+        command[0] = 1.0;
+        let channels = vec![
+            (Channel::Displacement, x.to_vec()),
+            (Channel::Velocity, v.to_vec()),
+            (COMMAND, command),
+            (FORCE, vec![0.0; x.len()]),
+        ];
+        let recording = Recording::new("damper", PERIOD, channels).unwrap();
+        let inputs = [Channel::Displacement, Channel::Velocity, COMMAND];
+        let recording = RigRecording::new(recording, &inputs, FORCE);
+        let mut out = vec![0.0; x.len()];
+        ControlledDamper.simulate(&recording, &NOMINAL, &effects, session, &mut out);
+        out
+    }
+
+    fn close(found: &[f64], expected: impl Fn(usize) -> f64) {
+        for (k, found) in found.iter().enumerate() {
+            let expected = expected(k);
+            assert!((found - expected).abs() < 1e-9, "{k}: {found} {expected}");
+        }
+    }
+
+    fn bare(k: usize) -> f64 {
+        100.0 * SPEEDS[k] + 500.0 * PLACES[k] + 3.0
+    }
+
+    #[test]
+    fn an_effect_adds_its_formula_to_the_force() {
+        type Case = (fn(&mut Effects), fn(usize) -> f64);
+        fn volts(k: usize) -> f64 {
+            if k == 0 { 1.0 } else { 3.0 }
+        }
+        let cases: [Case; 7] = [
+            (|_| (), |_| 0.0),
+            (
+                |e| e.damping_by_command.growth = 20.0,
+                |k| 20.0 * volts(k) * SPEEDS[k],
+            ),
+            (
+                |e| e.shear_thinning.curvature = 2.0,
+                |k| 100.0 * SPEEDS[k] * (1.0 / (1.0 + 2.0 * SPEEDS[k].abs()) - 1.0),
+            ),
+            (
+                |e| e.quadratic_damping.damping = 50.0,
+                |k| 50.0 * SPEEDS[k].abs() * SPEEDS[k],
+            ),
+            (|e| e.asymmetry.share = 0.1, |k| 10.0 * SPEEDS[k].abs()),
+            (
+                |e| e.cubic_stiffness.stiffness = 1e4,
+                |k| 1e4 * PLACES[k].powi(3),
+            ),
+            (
+                |e| {
+                    e.damping_by_command.growth = 20.0;
+                    e.command_saturation.curvature = 0.5;
+                },
+                |k| 20.0 * volts(k) / (1.0 + 0.5 * volts(k)) * SPEEDS[k],
+            ),
+        ];
+        for (set, more) in cases {
+            let found = force(&PLACES, &SPEEDS, &Session::default(), set);
+            close(&found, |k| bare(k) + more(k));
+        }
+        let zero = Session {
+            zero: 0.7,
+            ..Session::default()
+        };
+        close(&force(&PLACES, &SPEEDS, &zero, |_| ()), |k| bare(k) + 0.7);
+        let found = force(&PLACES, &SPEEDS, &Session::default(), |e| {
+            e.inertia.mass = 2.0;
+        });
+        for k in 1..5 {
+            let rate = (SPEEDS[k + 1] - SPEEDS[k - 1]) / (2.0 * PERIOD);
+            assert!((found[k] - bare(k) - 2.0 * rate).abs() < 1e-9, "{k}");
+        }
+    }
+
+    #[test]
+    fn friction_builds_up_over_the_way_and_with_the_command() {
+        // 5 mm per sample, a quarter of the way over which it builds up.
+        let x: Vec<f64> = (0..8).map(|k| 5e-3 * f64::from(k)).collect();
+        let set = |e: &mut Effects| {
+            e.hysteretic_friction = HystereticFriction {
+                force: 10.0,
+                build_up: 0.02,
+            };
+        };
+        let begun = Session {
+            taken_up: 0.3,
+            ..Session::default()
+        };
+        let share = |k: usize| 1.0 - 0.7 * (-0.25 * k as f64).exp();
+        let found = force(&x, &[0.0; 8], &begun, set);
+        close(&found, |k| 3.0 + 500.0 * x[k] + 10.0 * share(k));
+        let found = force(&x, &[0.0; 8], &begun, |e| {
+            set(e);
+            e.friction_by_command.growth = 0.5;
+        });
+        // Twice as much at 3 V as at 1 V.
+        let strength = |k: usize| if k == 0 { 10.0 } else { 20.0 };
+        close(&found, |k| 3.0 + 500.0 * x[k] + strength(k) * share(k));
+    }
+
+    #[test]
+    fn lags_and_delays_are_those_of_steps_and_ramps() {
+        let none = Session::default();
+        let after = |k: usize| (-PERIOD * k as f64 / 0.02).exp();
+        let found = force(&[0.0; 8], &[0.1; 8], &none, |e| {
+            e.damping_by_command.growth = 20.0;
+            e.command_lag.time_constant = 0.02;
+        });
+        close(&found, |k| {
+            3.0 + 0.1 * (100.0 + 20.0 * (3.0 - 2.0 * after(k)))
+        });
+        let mut step = [0.01; 8];
+        step[0] = 0.0;
+        let found = force(&step, &[0.0; 8], &none, |e| {
+            e.force_lag.time_constant = 0.02;
+        });
+        close(&found, |k| 3.0 + 5.0 * (1.0 - after(k)));
+        let ramp: Vec<f64> = (0..8).map(|k| 1e-3 * f64::from(k)).collect();
+        let found = force(&ramp, &[0.0; 8], &none, |e| {
+            e.force_delay.delay = 1.5 * PERIOD;
+        });
+        close(&found[2..], |k| 3.0 + 0.5 * (k as f64 + 0.5));
+    }
+}

@@ -435,6 +435,177 @@ mod tests {
         }
     }
 
+    /// Rates of the states under a command and its slope: the equations of which [`Step`] is the solution.
+    fn rates(
+        form: &Loop,
+        y: &State,
+        [command, slope]: [f64; 2],
+        beyond: fn(f64) -> f64,
+        passed: fn(f64) -> f64,
+    ) -> State {
+        let [lagging, x, flow, sum, speed, pulled, spool, _] = *y;
+        let (lags, swings, yields) = (
+            form.command_lag > 0.0,
+            form.resonance > 0.0,
+            form.loop_lag > 0.0,
+        );
+        let (wanted, rate) = if lags {
+            (lagging, (command - lagging) / form.command_lag)
+        } else {
+            (command, slope)
+        };
+        let error = wanted - x;
+        let rubbed = match form.friction {
+            Some(Rubbing {
+                most,
+                law: Law::Sliding(own),
+            }) => most * (if swings { speed } else { flow } / own).tanh(),
+            _ => 0.0,
+        };
+        let mut d: State = [0.0; WIDTH];
+        d[0] = if lags { rate } else { 0.0 };
+        d[3] = form.integral * error;
+        let mut sent = error + form.feedforward / form.gain * rate + sum;
+        let own = form.resonance_damping * (1.0 - form.fed_back);
+        let pull = pulled - 0.5 / own * rubbed;
+        if swings {
+            sent -= 2.0 * form.resonance_damping * form.fed_back / form.gain * pull;
+        }
+        let asked = form.gain * sent + beyond(sent);
+        let droop = form.gain * form.spring_droop * x;
+        let half = 0.5 * form.loop_lag;
+        d[6] = if yields { (asked - spool) / half } else { 0.0 };
+        if swings {
+            d[2] = (spool - flow) / half;
+            d[1] = speed;
+            d[4] = pull / form.resonance;
+            let pushed = flow + passed(flow) - droop - speed - 2.0 * own * pulled;
+            d[5] = pushed / form.resonance;
+        } else if yields {
+            d[2] = (spool + passed(spool) - droop - rubbed - flow) / half;
+            d[1] = flow;
+        } else {
+            d[1] = asked - droop;
+        }
+        d
+    }
+
+    /// The largest difference of displacements from the classical Runge-Kutta method with a fortieth of the step, over
+    /// the largest displacement.
+    fn away(form: &Loop, beyond: fn(f64) -> f64, passed: fn(f64) -> f64) -> f64 {
+        let (length, inner) = (1e-3, 40);
+        let step = form.step(length, length);
+        let h = length / f64::from(inner);
+        let command = |k: i32| (5.0 * length * f64::from(k)).sin() + 0.3;
+        let (mut own, mut other): (State, State) = ([0.0; WIDTH], [0.0; WIDTH]);
+        let (mut most, mut size) = (0.0_f64, 0.0_f64);
+        for k in 0..600 {
+            let ends = [command(k), command(k + 1)];
+            let slope = (ends[1] - ends[0]) / length;
+            let passes = step.spool.map(|at| (at, &passed));
+            own = step.advance(own, &Course { ends, slope }, Some(&beyond), passes);
+            for i in 0..inner {
+                let at = |share: f64| ends[0] + slope * h * (f64::from(i) + share);
+                let along =
+                    |by: f64, d: &State| -> State { std::array::from_fn(|n| other[n] + by * d[n]) };
+                let of = |y: &State, share: f64| rates(form, y, [at(share), slope], beyond, passed);
+                let a = of(&other, 0.0);
+                let b = of(&along(0.5 * h, &a), 0.5);
+                let c = of(&along(0.5 * h, &b), 0.5);
+                let d = of(&along(h, &c), 1.0);
+                for n in 0..WIDTH {
+                    other[n] += h / 6.0 * (a[n] + 2.0 * (b[n] + c[n]) + d[n]);
+                }
+            }
+            most = most.max((own[1] - other[1]).abs());
+            size = size.max(other[1].abs());
+        }
+        most / size
+    }
+
+    #[test]
+    fn steps_follow_the_equations_of_the_loop() {
+        let plain = Loop {
+            gain: 30.0,
+            command_lag: 0.0,
+            loop_lag: 0.0,
+            feedforward: 0.4,
+            integral: 0.7,
+            spring_droop: 0.05,
+            resonance: 0.0,
+            resonance_damping: 0.3,
+            fed_back: 0.2,
+            friction: None,
+        };
+        let lagging = Loop {
+            command_lag: 0.02,
+            loop_lag: 0.012,
+            ..plain
+        };
+        let swinging = Loop {
+            resonance: 0.008,
+            ..lagging
+        };
+        let rubbing = Some(Rubbing {
+            most: 1.5,
+            law: Law::Sliding(2.0),
+        });
+        let none: fn(f64) -> f64 = |_| 0.0;
+        // A valve that opens less the farther it does, and one through which less passes.
+        let beyond: fn(f64) -> f64 = |sent| -40.0 * sent.powi(3);
+        let passed: fn(f64) -> f64 = |flow| -4e-3 * flow.powi(3);
+        for form in [plain, lagging, swinging] {
+            let name = (form.loop_lag, form.resonance);
+            let found = [
+                away(&form, none, none),
+                away(&form, beyond, none),
+                away(&form, beyond, passed),
+            ];
+            assert!(found.iter().all(|own| *own < 2e-5), "{name:?}: {found:?}");
+            if form.loop_lag > 0.0 {
+                let rubbed = Loop {
+                    friction: rubbing,
+                    ..form
+                };
+                let found = away(&rubbed, beyond, passed);
+                assert!(found < 2e-3, "{name:?}: {found:?}");
+            }
+        }
+    }
+
+    /// From rest, as sliding as fast as it is left.
+    #[test]
+    fn friction_takes_of_a_speed_what_its_law_says() {
+        let (most, sliding) = (0.3, 0.05);
+        for free in [0.9, 0.31, 0.2, 1e-3, -0.4] {
+            let taken = rubbing([0.0, free], most, sliding);
+            let left = free - most * taken;
+            assert!(
+                (taken - (left / sliding).tanh()).abs() < 1e-6,
+                "{free}: {taken}"
+            );
+        }
+        // From 0.1 to -0.2 it turns where friction has the rest of the step.
+        let end = -0.2 - most * (0.1_f64 / sliding).tanh();
+        let part = end / (end - 0.1);
+        let taken = rubbing([0.1, -0.2], most, sliding);
+        let left = -0.2 - most * taken;
+        let turned = part * (-0.2 - 0.1) - left;
+        let expected = part * most * (left / sliding).tanh();
+        assert!((turned - expected).abs() < 1e-6, "{turned} {expected}");
+        // Bristles of 0.1 mm, bent by half, after a step of 10 ms.
+        let (deflection, length) = (1e-4, 0.01);
+        for (now, free, bent) in [(0.2, 0.3, 0.5), (0.01, 0.02, -0.5), (-0.1, -0.4, 0.9)] {
+            let taken = bending(deflection, [now, free], most, bent, length);
+            let left = free - most * taken;
+            let way = 0.5 * length * (now + left) / deflection;
+            let side = way.signum();
+            let decay = 1.0 + way.abs() + 0.5 * way * way;
+            let expected = side - (side - bent) / decay;
+            assert!((taken - expected).abs() < 1e-4, "{now}: {taken} {expected}");
+        }
+    }
+
     #[test]
     fn the_quick_tanh_is_the_library_s() {
         for k in -4000..4000 {
