@@ -306,8 +306,166 @@ pub fn start_speed(positions: &[f64], sample: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::super::EffectTable;
     use super::*;
+
+    impl Carriage<'_> {
+        /// The same behind samples of `voltages`.
+        fn advanced(mut self, voltages: &[f64]) -> Self {
+            voltages.iter().for_each(|u| self.advance(*u));
+            self
+        }
+    }
+
+    const MECHANICS: Mechanics = Mechanics {
+        mass: 2.0,
+        viscous: 6.0,
+        coulomb: 5.0,
+        offset: 1.0,
+        force_gain: 10.0,
+        stiffness: 0.0,
+    };
+    const SAMPLE: f64 = 1e-3;
+
+    /// Speed and position of a carriage that began with 0.5 m/s, after samples under 3 V.
+    fn driven(mechanics: Mechanics, samples: usize, set: impl Fn(&mut Effects)) -> (f64, f64) {
+        let mut effects = Effects::off().unwrap();
+        set(&mut effects);
+        let mut carriage = Carriage::new(mechanics, &effects, SAMPLE, (0.0, 0.5), &[]);
+        (0..samples).for_each(|_| carriage.advance(3.0));
+        (carriage.speed, carriage.position)
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}");
+    }
+
+    /// `2 v' = 30 - 6 v - 5 - 1` from 0.5 m/s: to 4 m/s within a third of a second.
+    #[test]
+    fn a_carriage_reaches_its_speed_by_its_mass_and_friction() {
+        for samples in [100, 400, 3000] {
+            let t = SAMPLE * samples as f64;
+            let left = (-3.0 * t).exp();
+            let (speed, position) = driven(MECHANICS, samples, |_| ());
+            near(speed, 4.0 - 3.5 * left);
+            near(position, 4.0 * t - 3.5 * (1.0 - left) / 3.0);
+        }
+        // Less than friction and offset leaves it at rest.
+        let none = Effects::off().unwrap();
+        let at_rest = Carriage::new(MECHANICS, &none, SAMPLE, (0.3, 0.0), &[]);
+        let mut carriage = at_rest.advanced(&[0.5, -0.3]);
+        assert_eq!((carriage.speed, carriage.position), (0.0, 0.3));
+        carriage.advance(0.7);
+        assert!(carriage.speed > 0.0);
+    }
+
+    /// Where the drive of 24 N beside the Coulomb friction meets the rest.
+    #[test]
+    fn a_steady_speed_balances_each_effect() {
+        let speed = |set: fn(&mut Effects)| driven(MECHANICS, 8000, set).0;
+        near(
+            speed(|e| e.asymmetric_friction.viscous_asymmetry = 0.2),
+            24.0 / 7.2,
+        );
+        // 6 v + 4 v^2 = 24.
+        near(
+            speed(|e| e.quadratic_drag.drag = 4.0),
+            (-6.0 + (36.0_f64 + 16.0 * 24.0).sqrt()) / 8.0,
+        );
+        // Far above 10 m/s it would be gone; at the balance v it is 5 (1 + 0.8 e^(-v/10)).
+        let v = speed(|e| {
+            e.speed_dependent_coulomb = SpeedDependentCoulomb {
+                excess: 0.8,
+                speed: 10.0,
+            };
+        });
+        near(6.0 * v + 5.0 * (1.0 + 0.8 * (-0.1 * v).exp()), 29.0);
+        // A lag and a delay take of the way what the speed makes in their time.
+        let way = |set: fn(&mut Effects)| {
+            let mut effects = Effects::off().unwrap();
+            set(&mut effects);
+            let at_rest = Carriage::new(MECHANICS, &effects, SAMPLE, (0.0, 0.0), &[0.0; 65]);
+            at_rest.advanced(&[3.0; 4000]).position
+        };
+        let whole = way(|_| ());
+        near(whole - way(|e| e.delay.delay = 12.5e-3), 12.5e-3 * 4.0);
+        // Until the force is 6 N, after `T ln(30 / 24)`, it does not move at all. Within half of a step's way.
+        let behind = whole - way(|e| e.actuation_lag.time_constant = 0.02);
+        let expected = 4.0 * 0.02 * (1.0 + (30.0_f64 / 24.0).ln());
+        let step = 4.0 * SAMPLE / STEPS as f64;
+        assert!(
+            (behind - expected).abs() < 0.6 * step,
+            "{behind} {expected}"
+        );
+    }
+
+    /// On a spring of 800 N/m without friction, and with a quarter of the mass on a spring of its own.
+    #[test]
+    fn a_spring_and_a_load_swing_at_their_frequencies() {
+        let free = Mechanics {
+            viscous: 0.0,
+            coulomb: 0.0,
+            offset: 0.0,
+            stiffness: 800.0,
+            ..MECHANICS
+        };
+        // 20 rad/s about 30 N / 800 N/m: from 0.5 m/s.
+        for samples in [50, 111, 200] {
+            let (sin, cos) = (20.0 * SAMPLE * samples as f64).sin_cos();
+            let (speed, position) = driven(free, samples, |_| ());
+            let expected = 0.0375 * (1.0 - cos) + 0.025 * sin;
+            assert!((position - expected).abs() < 5e-4, "{position} {expected}");
+            let expected = 0.75 * sin + 0.5 * cos;
+            assert!((speed - expected).abs() < 0.02, "{speed} {expected}");
+        }
+        // With a load the common motion is that of the whole mass: `2 v' = 30`.
+        let loose = Mechanics {
+            stiffness: 0.0,
+            ..free
+        };
+        let mut effects = Effects::off().unwrap();
+        effects.flexibility = Flexibility {
+            share: 0.25,
+            frequency: 60.0,
+        };
+        let begun = Carriage::new(loose, &effects, SAMPLE, (0.0, 0.5), &[]);
+        let own = begun.advanced(&[3.0; 1000]);
+        near(own.speed, 0.5 + 15.0);
+        near(own.position, 0.5 + 7.5);
+        // The load hangs back by its acceleration over `w^2`.
+        let back = (own.position - own.load_position) * 60.0 * 60.0;
+        assert!((back - 15.0).abs() < 0.3, "{back}");
+    }
+
+    #[test]
+    fn the_speed_of_a_begin_is_the_slope_of_its_line() {
+        let line: Vec<f64> = (0..7).map(|k| 0.2 + 0.03 * f64::from(k)).collect();
+        assert!((start_speed(&line, 0.01) - 3.0).abs() < 1e-12);
+        // What turns about the line does not count.
+        let turned = [0.0, 1.0, 1.0, 0.0];
+        assert_eq!(start_speed(&turned, 0.5), 0.0);
+    }
+
+    /// 40 cycles over a travel of 0.2 m, forward and backward.
+    #[test]
+    fn a_ripple_is_looked_for_where_its_period_is() {
+        let turn = |k: usize| 0.1 * (1.0 - (TAU * k as f64 / 4000.0).cos());
+        let position: Vec<f64> = (0..4000).map(turn).collect();
+        let errors: Vec<f64> = position
+            .iter()
+            .map(|q| 3.0 + (TAU * q / 5e-3 + 0.4).sin())
+            .collect();
+        let starts = ripple_starts(50.0, &position, &errors);
+        let (name, first) = &starts[0];
+        assert_eq!((*name, first[0], first[1]), ("force_ripple", 1.0, 1.0));
+        near(first[2], 5e-3);
+        let signs: Vec<[f64; 2]> = starts[..4].iter().map(|own| [own.1[0], own.1[1]]).collect();
+        assert_eq!(signs, [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]);
+        assert!(ripple_starts(50.0, &[0.1; 4000], &errors).is_empty());
+        assert!(ripple_starts(50.0, &position[..900], &errors[..900]).is_empty());
+    }
 
     #[test]
     fn friction_that_falls_along_the_travel_never_drives() {

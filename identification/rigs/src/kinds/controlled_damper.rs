@@ -214,9 +214,7 @@ mod tests {
 
     /// The force at `x` and `v` under a command of 1 V, and of 3 V from the second sample on.
     fn force(x: &[f64], v: &[f64], session: &Session, set: impl Fn(&mut Effects)) -> Vec<f64> {
-        let all = Effects::table().into_iter();
-        let off: Vec<f64> = all.flat_map(|own| own.off).collect();
-        let mut effects = Effects::from_values(&off).unwrap();
+        let mut effects = Effects::off().unwrap();
         set(&mut effects);
         let mut command = vec![3.0; x.len()];
         command[0] = 1.0;

@@ -456,9 +456,7 @@ mod tests {
 
     /// Rates of `state` under a force of 7 N, with 0.5 N added on the mass.
     fn rates(state: State, set: impl Fn(&mut Effects)) -> State {
-        let all = Effects::table().into_iter();
-        let off: Vec<f64> = all.flat_map(|own| own.off).collect();
-        let mut effects = Effects::from_values(&off).unwrap();
+        let mut effects = Effects::off().unwrap();
         set(&mut effects);
         Law::new(&NOMINAL, &effects).slope(&state, 7.0, 0.5)
     }

@@ -221,3 +221,62 @@ pub(in crate::kinds) trait InParts: SimulatedModel {
         (0..self.candidates().len()).find(|&i| self.name(i) == name)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file whose first half is fitted, at rest for 20 samples and then at 1 and -1 in turn, and one that is left
+    /// out, with a gap and a sample that is given.
+    #[test]
+    fn records_are_the_parts_their_folds_and_begins_everything_and_each_file() {
+        let first: Vec<f64> = (0..160)
+            .map(|k| match k {
+                0..20 => 0.0,
+                _ if k % 2 == 0 => 1.0,
+                _ => -1.0,
+            })
+            .collect();
+        let mut second = vec![0.5; 32];
+        second[3] = f64::NAN;
+        let is_given: Vec<bool> = (0..32).map(|k| k == 7).collect();
+        let is_out: Vec<bool> = (0..160).map(|k| k >= 80).collect();
+        let files = [
+            File {
+                output: &first,
+                left_out: &is_out,
+                is_given: &[],
+            },
+            File {
+                output: &second,
+                left_out: &[true; 32],
+                is_given: &is_given,
+            },
+        ];
+        let all = places(&files, 8);
+        assert_eq!(all.len(), 11);
+        let measured: Vec<usize> = (0..32).filter(|k| ![3, 7].contains(k)).collect();
+        let whole: Vec<usize> = (0..160).collect();
+        assert_eq!(all[0], [whole[..80].to_vec(), Vec::new()]);
+        assert_eq!(all[1], [whole[80..].to_vec(), measured.clone()]);
+        assert_eq!(all[EVERYTHING], [whole.clone(), measured.clone()]);
+        assert_eq!(all[file(0)], [whole.clone(), Vec::new()]);
+        assert_eq!(all[file(1)], [Vec::new(), measured]);
+        // Sixteen runs of five, which the folds take in turn.
+        for (fold, first_run) in folds(0).into_iter().zip([0, 1]) {
+            let own = whole[..80].iter().copied();
+            let own = own.filter(|k| k / 5 % 2 == first_run);
+            assert_eq!(all[fold][0], own.collect::<Vec<_>>(), "{}", NAMES[fold]);
+        }
+        let mut both = folds(1).map(|fold| all[fold].concat()).concat();
+        both.sort_unstable();
+        let mut whole_part = all[1].concat();
+        whole_part.sort_unstable();
+        assert_eq!(both, whole_part);
+        assert_eq!((folds(EVERYTHING), folds(file(1))), ([0, 1], [0, 1]));
+        // A first look lasts until 0.3 of the variation was seen, 18 of 60 samples, or for so many samples.
+        assert_eq!(all[screen(0)][0], whole[..38]);
+        assert_eq!(places(&files, 50)[screen(0)][0], whole[..50]);
+        assert_eq!(screen(EVERYTHING), EVERYTHING);
+    }
+}

@@ -307,4 +307,20 @@ mod tests {
             assert_eq!(read(cell), None, "{cell}");
         }
     }
+
+    #[test]
+    fn words_are_in_small_letters_without_accents() {
+        for (name, expected) in [
+            ("Âge à Måling", "age a maling"),
+            ("Force reçue", "force recue"),
+            ("Élan relevé, même Noël", "elan releve meme noel"),
+            ("Dì naïf, île", "di naif ile"),
+            ("Señal", "senal"),
+            ("Größe òrdine", "grosse ordine"),
+            ("Où Züge", "ou zuge"),
+            ("actuatorForce_N", "actuator force n"),
+        ] {
+            assert_eq!(words(name).join(" "), expected);
+        }
+    }
 }
