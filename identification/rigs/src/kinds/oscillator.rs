@@ -468,7 +468,8 @@ mod tests {
     /// At -0.3 m and 0.8 m/s, in N.
     #[test]
     fn an_effect_resists_with_its_formula_beside_spring_and_damper() {
-        let cases: [(fn(&mut Effects), f64); 11] = [
+        type Case = (fn(&mut Effects), f64);
+        let cases: [Case; 11] = [
             (|_| (), 0.0),
             (|e| e.cubic_stiffness.stiffness = 4.0, 4.0 * -0.027),
             (|e| e.quadratic_stiffness.stiffness = 4.0, 4.0 * 0.09),
