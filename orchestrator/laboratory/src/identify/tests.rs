@@ -6,7 +6,7 @@ use plant::identified::rig::{IdentifiedRig, IdentifiedRigState};
 use plant::sensors::channel::Noise;
 
 use super::*;
-use pages::report::{Abscissa, Panel, Section};
+use pages::report::{Abscissa, Panel, Section, Style};
 
 const PERIOD: f64 = 0.002;
 
@@ -142,6 +142,22 @@ fn command_and_displacement_alone_give_their_transfer_function() {
         }
         assert!(at(gain, 0, hertz) <= at(gain, 1, hertz));
     }
+    // The band reaches two deviations to either side.
+    let Style::Band(above) = &gain.series[0].style else {
+        panic!("a band expected")
+    };
+    let linear = |decibel: f64| 10_f64.powf(decibel / 20.0);
+    let ends = gain.series[0].values.iter().zip(above);
+    let mut clear = 0;
+    for (measured, (low, high)) in own.found.response.iter().zip(ends) {
+        let (size, half) = (measured.value.norm(), 2.0 * measured.deviation);
+        assert!((linear(*high) / (size + half) - 1.0).abs() < 1e-9);
+        if half < 0.9 * size {
+            assert!((linear(*low) / (size - half) - 1.0).abs() < 1e-9);
+            clear += 1;
+        }
+    }
+    assert!(clear > 5, "{clear}");
     let [rest] = &section(&page, "Validation").panels[..] else {
         panic!("one recording")
     };
