@@ -51,8 +51,7 @@ const CLEARLY: f64 = 0.9;
 const ENDED: usize = 3;
 /// Seed of those starts.
 pub const STARTS_SEED: u64 = 15;
-/// Steps of a glance, of a first look and of a fit to the end.
-const GLANCE: usize = 2;
+/// Steps of a first look and of a fit to the end.
 const LOOK: usize = 6;
 const TO_THE_END: usize = 40;
 /// Models of which errors on the folds are kept.
@@ -618,9 +617,8 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
     }
 }
 
-/// `effect` beside the nominal parameters at `stated`, from the one of the `values` to begin with that is best after a
-/// glance. The derivatives are its own: where it changes the whole motion, as an overlap does with small commands, those
-/// of a model without it mislead.
+/// `effect` beside the nominal parameters at `stated`, from the best of the `values` to begin with. The derivatives are its
+/// own: where it changes the whole motion, as an overlap does with small commands, those of a model without it mislead.
 fn looked_with<M: SimulatedModel>(
     model: &M,
     stated: &Point,
@@ -632,7 +630,7 @@ fn looked_with<M: SimulatedModel>(
     let trials = values.iter().filter_map(|values| {
         let mut point = stated.clone();
         point.effects.push((effect, candidate.internal(values)));
-        least_squares(model, &point, record, &Free::All, GLANCE)
+        solution(model, &point, record)
     });
     let best = trials.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     least_squares(model, &best.point, record, &Free::All, LOOK)
@@ -1020,7 +1018,7 @@ mod tests {
     #[test]
     fn an_effect_that_lets_hardly_anything_pass_is_found_from_what_was_stated() {
         let mut model = Halves::new(&["overlap"], overlapped);
-        model.candidates[0].starts = vec![vec![40.0], vec![0.5]];
+        model.candidates[0].starts = vec![vec![0.1], vec![0.5]];
         let stated = Point {
             nuisance: vec![0.0],
             effects: Vec::new(),
