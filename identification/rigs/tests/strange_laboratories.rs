@@ -106,6 +106,21 @@ fn an_overlap_is_found_where_commands_hardly_exceed_it() {
     }
 }
 
+/// A gain that differs with direction and an overlap, of which one file tells a friction: without them the middle of the
+/// motion looks like a zero.
+#[test]
+#[ignore = "slow: a minute"]
+fn a_zero_is_no_cause_where_effects_that_explain_more_have_none() {
+    let found = diagnosed(4505);
+    assert!(found.causes.is_empty(), "{:?}", found.causes);
+    let asymmetry = found.readings.iter().find_map(|own| {
+        let mut effects = own.effects.iter();
+        effects.find(|(name, _)| name == "asymmetric_gain")
+    });
+    let (_, values) = asymmetry.unwrap();
+    assert!((values[0].value - 0.0996).abs() < 0.01, "{values:?}");
+}
+
 /// An overlap beside a delay of 8.88 ms, after which an orifice's flow leaves half a percent.
 #[test]
 #[ignore = "slow: a minute"]

@@ -33,6 +33,23 @@ pub(super) struct Causes {
     pub(super) weighed: Vec<Weighed>,
 }
 
+impl Causes {
+    /// Doubts what another model of the same data, which has these `parameters`, has as stated.
+    pub(super) fn doubt<M: InParts>(&mut self, measured: &M, parameters: &[NamedValue]) {
+        let is_as_stated = |cause: &Cause| {
+            let mut own = parameters.iter().enumerate();
+            let own = own.find(|(_, parameter)| parameter.name == cause.found.name);
+            own.is_some_and(|(i, parameter)| {
+                Cause::of(parameter.clone(), measured.stated(i)).is_none()
+            })
+        };
+        let all = std::mem::take(&mut self.named).into_iter();
+        let (doubted, named): (Vec<Cause>, Vec<Cause>) = all.partition(is_as_stated);
+        self.named = named;
+        self.doubted.extend(doubted);
+    }
+}
+
 /// The causes among the nominal parameters of the model `confirmed`, of which `crossed` are the errors on either part.
 /// Widens its intervals to what the data leave open.
 pub(super) fn causes<M: InParts>(
@@ -220,4 +237,52 @@ fn beyond<M: InParts>(
         cause.found.standard_error = 0.5 * (high - low) / INTERVAL_95;
         Some(cause)
     })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::super::measured::Measured;
+    use super::super::{Measurement, RigRecording, of_kind};
+    use super::*;
+    use recordings::{Channel, Recording};
+
+    #[test]
+    fn what_a_better_model_has_as_stated_is_doubted() {
+        let rig = of_kind("closed_loop_actuator").unwrap();
+        let command = rig.inputs()[0];
+        let wave: Vec<f64> = (0..200).map(|k| (0.1 * f64::from(k)).sin()).collect();
+        let channels = vec![(command, wave.clone()), (Channel::Displacement, wave)];
+        let recording = Recording::new("one", 0.01, channels).unwrap();
+        let recording = RigRecording::new(recording, &[command], Channel::Displacement);
+        let measurement = Measurement {
+            recordings: vec![recording],
+        };
+        let stated = |name: &str| match name {
+            "scale" => (1.0, 0.01),
+            "offset" => (0.0, 1e-3),
+            _ => (0.0, 0.0),
+        };
+        let nominal = rig.parameters().iter().map(|(name, _)| stated(name));
+        let measured = Measured::new(rig, &measurement, nominal.collect());
+        let mut parameters = measured.parameters(&measured.origin(), &[]);
+        let mut all = Causes::default();
+        for own in &mut parameters {
+            own.standard_error = 1e-4;
+            let found = NamedValue {
+                value: own.value + 0.1,
+                ..own.clone()
+            };
+            let place = if own.name == "scale" { 1.0 } else { 0.0 };
+            all.named.extend(Cause::of(found, (place, 0.01)));
+        }
+        let names =
+            |of: &[Cause]| -> Vec<String> { of.iter().map(|own| own.found.name.clone()).collect() };
+        assert_eq!(names(&all.named), ["scale", "offset"]);
+        let scale = parameters.iter_mut().find(|own| own.name == "scale");
+        scale.unwrap().value += 0.1;
+        all.doubt(&measured, &parameters);
+        assert_eq!(names(&all.named), ["scale"]);
+        assert_eq!(names(&all.doubted), ["offset"]);
+    }
 }

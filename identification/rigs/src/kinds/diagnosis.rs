@@ -25,6 +25,8 @@ use diagnosis::{
 /// Share of the described model's error that is left, in both parts, where a nominal parameter that is far from what
 /// was stated is a cause although the errors do not agree.
 const MOST: f64 = 0.5;
+/// Error of a model with effects over that of one without, below which its nominal parameters count for more.
+const RICHER: f64 = 0.7;
 /// Why an effect is not named that the data do not need for sure.
 const DOUBTED: &str = "the prediction of either part is hardly worse without it";
 /// Why an effect is not named where what one part finds predicts the data far better.
@@ -360,7 +362,13 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         .into_iter()
         .all(|(error, nominal)| error < LOST && error < MOST * nominal);
     let standing = Standing { holds, explains };
-    let found = causes(measured, &mut confirmed, &crossed, standing, observer);
+    let mut found = causes(measured, &mut confirmed, &crossed, standing, observer);
+    // A model that lacks an effect bends towards it, and so does a zero: an asymmetry moves the middle of the motion.
+    if confirmed.effects.is_empty() && !holds && !found.named.is_empty() && !observer.is_over() {
+        for richer in richer(measured, proposed, confirmed.fitted_error) {
+            found.doubt(measured, &richer);
+        }
+    }
     weighed.extend(found.weighed);
     // What sensors tell alone they tell better than a model in which others make up for it.
     let is_open = |own: &Cause| !measured.is_read(&own.found.name);
@@ -437,6 +445,18 @@ fn readings<M: InParts>(
     let origin = completed(measured, &measured.origin(), None, tested);
     let ranked = ranked(weighed, &all_errors(measured, &origin, tested));
     suspected.iter().fold(ranked, with_and_without)
+}
+
+/// Nominal parameters of the models with effects among those `proposed` that, fitted to all data, leave far less than
+/// `error`.
+fn richer<M: InParts>(measured: &M, proposed: [&Point; 3], error: f64) -> Vec<Vec<NamedValue>> {
+    let with_effects = proposed.into_iter().filter(|own| !own.effects.is_empty());
+    let fitted = with_effects.filter_map(|point| refit(measured, point, EVERYTHING));
+    let leaves = |point: &Point| measured.normalised_error(point, EVERYTHING);
+    let better = fitted.filter(|(found, _)| leaves(&found.point) < RICHER * error);
+    better
+        .map(|(found, deviations)| measured.parameters(&found.point, &deviations))
+        .collect()
 }
 
 /// The models of different effects among those `proposed`, fitted to all data, without effects that these do not show.
