@@ -458,10 +458,10 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         } else {
             Vec::new()
         };
-        let mut quick: Vec<(usize, Solution)> = among
+        let looks = among
             .par_iter()
             .filter(|effect| !in_base(**effect))
-            .filter_map(|&effect| {
+            .map(|&effect| {
                 let candidate = &candidates[effect];
                 let own = suggested.iter().filter(|(i, _)| *i == effect);
                 let own = own.map(|(_, values)| values);
@@ -477,18 +477,27 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
                 let begun: Vec<&Point> = begun.iter().filter(|point| with_it(point)).collect();
                 let own = is_bare.then(|| looked_with(model, &stated, effect, &values, screen));
                 let all = starts.chain(opened(model, &begun, screen, LOOK));
-                let all = all.chain(own.flatten());
-                let best = all.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-                Some((effect, best))
-            })
-            .collect();
-        quick.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-        quick.truncate(FINALISTS);
-        let settled = quick.par_iter().filter_map(|(effect, quick)| {
-            let settled = settle(model, &quick.point, record, TO_THE_END)?;
+                let best = all.min_by(|a, b| a.cost.total_cmp(&b.cost));
+                [best, own.flatten()].map(|look| look.map(|look| (effect, look)))
+            });
+        let looks: Vec<[Option<(usize, Solution)>; 2]> = looks.collect();
+        // Which look is ahead tells little of where a fit ends.
+        let finalists = |way: usize| {
+            let all = looks.iter().filter_map(|own| own[way].as_ref());
+            let mut all: Vec<&(usize, Solution)> = all.collect();
+            all.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+            all.truncate(FINALISTS);
+            all
+        };
+        let all = [finalists(0), finalists(1)].concat();
+        let settled = all.par_iter().filter_map(|(effect, look)| {
+            let settled = settle(model, &look.point, record, TO_THE_END)?;
             Some((*effect, settled))
         });
-        Some(settled.collect())
+        let mut settled: Vec<(usize, Simulated)> = settled.collect();
+        settled.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.squares.total_cmp(&b.1.squares)));
+        settled.dedup_by_key(|own| own.0);
+        Some(settled)
     }
 
     /// Whether an effect of `point` is at a bound other than zero.
