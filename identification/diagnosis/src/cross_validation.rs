@@ -38,6 +38,8 @@ const WORTH_TESTING: f64 = 0.7;
 const MOST_EFFECTS: usize = 8;
 /// Effects, the weakest first, in whose place others are searched.
 const EXCHANGED: usize = 2;
+/// Squared error of a look over that of another one which is far ahead of it.
+const AHEAD: f64 = 4.0;
 /// Candidates that are fitted to the end in a round.
 const FINALISTS: usize = 6;
 /// Starts of the nominal model beside the stated values, and how far they lie from these, in stated
@@ -451,6 +453,8 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             let held = |i: usize| i == effect || alike.contains(&candidates[i].effect);
             base.point.effects.iter().any(|(i, _)| held(*i))
         };
+        let is_far_ahead =
+            |own: &Solution, best: &Solution| AHEAD * squares(&own.errors) < squares(&best.errors);
         let suggested = model.starts(&base.point, screen);
         let is_bare = base.point.effects.is_empty();
         let begun = if is_bare {
@@ -458,10 +462,10 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
         } else {
             Vec::new()
         };
-        let looks = among
+        let mut quick: Vec<(usize, Solution)> = among
             .par_iter()
             .filter(|effect| !in_base(**effect))
-            .map(|&effect| {
+            .filter_map(|&effect| {
                 let candidate = &candidates[effect];
                 let own = suggested.iter().filter(|(i, _)| *i == effect);
                 let own = own.map(|(_, values)| values);
@@ -478,26 +482,21 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
                 let own = is_bare.then(|| looked_with(model, &stated, effect, &values, screen));
                 let all = starts.chain(opened(model, &begun, screen, LOOK));
                 let best = all.min_by(|a, b| a.cost.total_cmp(&b.cost));
-                [best, own.flatten()].map(|look| look.map(|look| (effect, look)))
-            });
-        let looks: Vec<[Option<(usize, Solution)>; 2]> = looks.collect();
-        // Which look is ahead tells little of where a fit ends.
-        let finalists = |way: usize| {
-            let all = looks.iter().filter_map(|own| own[way].as_ref());
-            let mut all: Vec<&(usize, Solution)> = all.collect();
-            all.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-            all.truncate(FINALISTS);
-            all
-        };
-        let all = [finalists(0), finalists(1)].concat();
-        let settled = all.par_iter().filter_map(|(effect, look)| {
-            let settled = settle(model, &look.point, record, TO_THE_END)?;
+                // Which look is ahead tells little of where a fit ends, unless it is far ahead.
+                let best = match (best, own.flatten()) {
+                    (Some(best), Some(own)) if is_far_ahead(&own, &best) => own,
+                    (best, own) => best.or(own)?,
+                };
+                Some((effect, best))
+            })
+            .collect();
+        quick.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+        quick.truncate(FINALISTS);
+        let settled = quick.par_iter().filter_map(|(effect, quick)| {
+            let settled = settle(model, &quick.point, record, TO_THE_END)?;
             Some((*effect, settled))
         });
-        let mut settled: Vec<(usize, Simulated)> = settled.collect();
-        settled.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.squares.total_cmp(&b.1.squares)));
-        settled.dedup_by_key(|own| own.0);
-        Some(settled)
+        Some(settled.collect())
     }
 
     /// Whether an effect of `point` is at a bound other than zero.
