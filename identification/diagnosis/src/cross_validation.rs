@@ -453,8 +453,6 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
             let held = |i: usize| i == effect || alike.contains(&candidates[i].effect);
             base.point.effects.iter().any(|(i, _)| held(*i))
         };
-        let is_far_ahead =
-            |own: &Solution, best: &Solution| AHEAD * squares(&own.errors) < squares(&best.errors);
         let suggested = model.starts(&base.point, screen);
         let is_bare = base.point.effects.is_empty();
         let begun = if is_bare {
@@ -470,21 +468,32 @@ impl<'a, M: SimulatedModel> CrossValidation<'a, M> {
                 let own = suggested.iter().filter(|(i, _)| *i == effect);
                 let own = own.map(|(_, values)| values);
                 let values: Vec<&Vec<f64>> = candidate.starts.iter().chain(own).collect();
-                let starts = bases.iter().flat_map(|(base, frozen)| {
-                    values.iter().filter_map(move |values| {
+                let beside = |base: &Point| -> Vec<Point> {
+                    let with = |values: &&Vec<f64>| {
                         let mut point = base.clone();
                         point.effects.push((effect, candidate.internal(values)));
+                        point
+                    };
+                    values.iter().map(with).collect()
+                };
+                let starts = bases.iter().flat_map(|(base, frozen)| {
+                    let look = |point: Point| {
                         least_squares(model, &point, screen, &Free::Frozen(frozen), LOOK)
-                    })
+                    };
+                    beside(base).into_iter().filter_map(look)
                 });
                 let with_it = |point: &Point| point.effects.iter().any(|(i, _)| *i == effect);
                 let begun: Vec<&Point> = begun.iter().filter(|point| with_it(point)).collect();
-                let own = is_bare.then(|| looked_with(model, &stated, effect, &values, screen));
+                let own = is_bare.then(|| looked_from_best(model, &beside(&stated), screen));
                 let all = starts.chain(opened(model, &begun, screen, LOOK));
                 let best = all.min_by(|a, b| a.cost.total_cmp(&b.cost));
                 // Which look is ahead tells little of where a fit ends, unless it is far ahead.
                 let best = match (best, own.flatten()) {
-                    (Some(best), Some(own)) if is_far_ahead(&own, &best) => own,
+                    (Some(best), Some(own))
+                        if AHEAD * squares(&own.errors) < squares(&best.errors) =>
+                    {
+                        own
+                    }
                     (best, own) => best.or(own)?,
                 };
                 Some((effect, best))
@@ -625,22 +634,16 @@ impl<M: SimulatedModel> Selection for CrossValidation<'_, M> {
     }
 }
 
-/// `effect` beside the nominal parameters at `stated`, from the best of the `values` to begin with. The derivatives are its
-/// own: where it changes the whole motion, as an overlap does with small commands, those of a model without it mislead.
-fn looked_with<M: SimulatedModel>(
+/// A look from the best of `starts` with an effect. The derivatives are its own: where the effect changes the whole motion,
+/// as an overlap does with small commands, those of a model without it mislead.
+fn looked_from_best<M: SimulatedModel>(
     model: &M,
-    stated: &Point,
-    effect: usize,
-    values: &[&Vec<f64>],
+    starts: &[Point],
     record: usize,
 ) -> Option<Solution> {
-    let candidate = &model.candidates()[effect];
-    let trials = values.iter().filter_map(|values| {
-        let mut point = stated.clone();
-        point.effects.push((effect, candidate.internal(values)));
-        solution(model, &point, record)
-    });
-    let best = trials.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let all = starts.iter();
+    let all = all.filter_map(|start| solution(model, start, record));
+    let best = all.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     least_squares(model, &best.point, record, &Free::All, LOOK)
 }
 
@@ -1025,14 +1028,12 @@ mod tests {
 
     #[test]
     fn an_effect_that_lets_hardly_anything_pass_is_found_from_what_was_stated() {
-        let mut model = Halves::new(&["overlap"], overlapped);
-        model.candidates[0].starts = vec![vec![0.1], vec![0.5]];
-        let stated = Point {
+        let model = Halves::new(&["overlap"], overlapped);
+        let starts = [0.1, 0.5].map(|overlap| Point {
             nuisance: vec![0.0],
-            effects: Vec::new(),
-        };
-        let values = model.candidates[0].starts.iter().collect::<Vec<_>>();
-        let found = looked_with(&model, &stated, 0, &values, 2).unwrap().point;
+            effects: vec![(0, vec![overlap])],
+        });
+        let found = looked_from_best(&model, &starts, 2).unwrap().point;
         assert!(
             (found.effects[0].1[0].abs() - 0.9).abs() < 0.01,
             "{found:?}"

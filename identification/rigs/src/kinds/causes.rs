@@ -78,14 +78,12 @@ pub(super) fn causes<M: InParts>(
             && let Some(own) = asked.profiled(i)
         {
             hidden = beyond(own, i, &fitted, stated, &confirmed.parameters);
-            all.suspected.extend(hidden.clone());
             fitted.value = own.value(i).unwrap_or(fitted.value);
         }
         let Some(mut told) = Cause::of(fitted, stated) else {
+            all.suspected.extend(hidden);
             continue;
         };
-        all.suspected
-            .retain(|own| own.found.name != told.found.name);
         // A zero shows in a file by itself, whatever a part tells of another.
         let is_believed = standing.holds
             || ((standing.explains || measured.is_of_first_file(i)) && told.deviations() > FAR);

@@ -244,7 +244,7 @@ pub(super) fn agrees(error: f64, fitted: f64) -> bool {
     error < LOST && (error < NEAR || error < AGREE * fitted)
 }
 
-/// The model `own`, fitted to `part`, where it predicts the other part. A part that does not tell a parameter may
+/// The model `own`, fitted to `part`, where it predicts the other part, and its error there. A part that does not tell a parameter may
 /// fit its own scatter with it and lose the other part altogether: where the model of `all` data serves it about
 /// as well, it contradicts nothing of it.
 pub(super) fn on_the_other<M: InParts>(
@@ -252,17 +252,24 @@ pub(super) fn on_the_other<M: InParts>(
     all: impl FnOnce() -> Option<Point>,
     own: &Point,
     part: Part,
-) -> Point {
+) -> (Point, f64) {
     let (fitted, other) = (part as usize, part.other() as usize);
     let used = completed(measured, own, Some(fitted), other);
-    if measured.normalised_error(&used, other) < LOST {
-        return used;
+    let error = measured.normalised_error(&used, other);
+    if error < LOST {
+        return (used, error);
     }
     let serves = |all: &Point| {
         let [error, own] = [all, own].map(|point| measured.normalised_error(point, fitted));
         agrees(error, own)
     };
-    all().filter(serves).unwrap_or(used)
+    match all().filter(serves) {
+        Some(all) => {
+            let error = measured.normalised_error(&all, other);
+            (all, error)
+        }
+        None => (used, error),
+    }
 }
 
 /// Samples of each file in `record`, of those that have some.
@@ -494,7 +501,7 @@ pub(super) fn confirm<M: InParts>(
         let all = || Some(point.clone());
         on_the_other(measured, all, &fits.parts[part as usize].0, part)
     };
-    let (here, there) = (on(Part::Fitted), on(Part::LeftOut));
+    let [(here, error), (there, swapped_error)] = [Part::Fitted, Part::LeftOut].map(on);
     for (part, used) in [(Part::Fitted, &here), (Part::LeftOut, &there)] {
         if used == point && fits.parts[part as usize].0 != *point {
             findings.push(format!(
@@ -523,8 +530,8 @@ pub(super) fn confirm<M: InParts>(
         )
     }));
     Some(Confirmed {
-        error: measured.normalised_error(&here, tested),
-        swapped_error: measured.normalised_error(&there, swapped),
+        error,
+        swapped_error,
         gain_interval: gains[0],
         pays: gains.iter().all(|own| own.0 > 0.0),
         refitted_error: measured.normalised_error(refitted, EVERYTHING),
@@ -788,7 +795,7 @@ mod tests {
             let point = point.clone();
             || Some(point)
         };
-        let used = |of: &Point, own: &Point, part| on_the_other(&measured, of_all(of), own, part);
+        let used = |of: &Point, own: &Point, part| on_the_other(&measured, of_all(of), own, part).0;
         let gain = |point: &Point| point.nuisance[0];
         assert_eq!(gain(&used(&all, &own, Part::LeftOut)), gain(&all));
         // What predicts the other part counts as it is, and a model that the part contradicts does not stand for it.

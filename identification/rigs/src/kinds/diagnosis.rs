@@ -1,5 +1,6 @@
 //! The diagnosis of a rig on real data.
 
+use std::cell::LazyCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,8 @@ use super::parts::{EVERYTHING, InParts, LOST, Part};
 use super::readings::{Crossed, Reading, Weighed, ranked, with_and_without};
 use super::{Description, DescriptionError, Measurement};
 use diagnosis::{
-    Observer, Point, Progress, Verdict, all_errors, completed, refit, select, select_jointly,
+    Observer, Point, Progress, Simulated, Verdict, all_errors, completed, refit, select,
+    select_jointly,
 };
 
 /// Share of the described model's error that is left, in both parts, where a nominal parameter that is far from what
@@ -294,6 +296,11 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     }
     // What is written may be far worse than what one part found alone.
     let proposed = [&start.point, &as_described.point, &swapped.point];
+    let refitted = LazyCell::new(|| proposed.map(|point| refit(measured, point, EVERYTHING)));
+    let alone = || match observer.is_over() {
+        true => Vec::new(),
+        false => unnamed(measured, &*refitted),
+    };
     let is_behind = |own: f64, alone: &PartReport| {
         own > NEAR && own.powi(2) > WORSE * alone.extended_error.powi(2)
     };
@@ -302,7 +309,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
         && (is_behind(confirmed.error, &as_described)
             || is_behind(confirmed.swapped_error, &swapped))
     {
-        let mut others = unnamed(measured, proposed, observer);
+        let mut others = alone();
         let is_far = |own: &Weighed| own.crossed.likelier_than(&crossed) > LIKELIER;
         if others.iter().any(is_far) {
             weighed.extend(Weighed::of(measured, &confirmed.point, crossed));
@@ -365,7 +372,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let mut found = causes(measured, &mut confirmed, &crossed, standing, observer);
     // A model that lacks an effect bends towards it, and so does a zero: an asymmetry moves the middle of the motion.
     if confirmed.effects.is_empty() && !holds && !found.named.is_empty() && !observer.is_over() {
-        for richer in richer(measured, proposed, confirmed.fitted_error) {
+        for richer in richer(measured, &*refitted, confirmed.fitted_error) {
             found.doubt(measured, &richer);
         }
     }
@@ -388,8 +395,7 @@ pub(super) fn judge<M: InParts>(measured: &M, observer: Observer<'_>) -> Option<
     let is_answered = !confirmed.effects.is_empty() || !causes.is_empty() || leaves_nothing;
     // What was found and is not named is ranked.
     if !is_answered {
-        let others = found_alone.unwrap_or_else(|| unnamed(measured, proposed, observer));
-        weighed.extend(others);
+        weighed.extend(found_alone.unwrap_or_else(alone));
     }
     let told = [&causes[..], &found.doubted, &suspected];
     let readings = readings(measured, weighed, told, (&confirmed, crossed));
@@ -447,32 +453,26 @@ fn readings<M: InParts>(
     suspected.iter().fold(ranked, with_and_without)
 }
 
-/// Nominal parameters of the models with effects among those `proposed` that, fitted to all data, leave far less than
-/// `error`.
-fn richer<M: InParts>(measured: &M, proposed: [&Point; 3], error: f64) -> Vec<Vec<NamedValue>> {
-    let with_effects = proposed.into_iter().filter(|own| !own.effects.is_empty());
-    let fitted = with_effects.filter_map(|point| refit(measured, point, EVERYTHING));
+/// A model that was proposed, fitted to all data, with standard deviations.
+type Refitted = Option<(Simulated, Vec<f64>)>;
+
+/// Nominal parameters of the models with effects among those `refitted` that leave far less than `error`.
+fn richer<M: InParts>(measured: &M, refitted: &[Refitted], error: f64) -> Vec<Vec<NamedValue>> {
     let leaves = |point: &Point| measured.normalised_error(point, EVERYTHING);
-    let better = fitted.filter(|(found, _)| leaves(&found.point) < RICHER * error);
+    let all = refitted.iter().flatten();
+    let with_effects = all.filter(|(found, _)| !found.point.effects.is_empty());
+    let better = with_effects.filter(|(found, _)| leaves(&found.point) < RICHER * error);
     better
-        .map(|(found, deviations)| measured.parameters(&found.point, &deviations))
+        .map(|(found, deviations)| measured.parameters(&found.point, deviations))
         .collect()
 }
 
-/// The models of different effects among those `proposed`, fitted to all data, without effects that these do not show.
-fn unnamed<M: InParts>(
-    measured: &M,
-    proposed: [&Point; 3],
-    observer: Observer<'_>,
-) -> Vec<Weighed> {
-    if observer.is_over() {
-        return Vec::new();
-    }
+/// The models of different effects among those `refitted`, without effects that all data do not show.
+fn unnamed<M: InParts>(measured: &M, refitted: &[Refitted]) -> Vec<Weighed> {
     let mut known = BTreeSet::from([BTreeSet::new()]);
-    let weighed = proposed.into_iter().filter_map(|point| {
-        let (found, deviations) = refit(measured, point, EVERYTHING)?;
-        let refused = unfit(measured, &found.point, &deviations, EVERYTHING);
-        let mut shown = found.point;
+    let weighed = refitted.iter().flatten().filter_map(|(found, deviations)| {
+        let refused = unfit(measured, &found.point, deviations, EVERYTHING);
+        let mut shown = found.point.clone();
         shown
             .effects
             .retain(|(i, _)| refused.iter().all(|(gone, _)| gone != i));

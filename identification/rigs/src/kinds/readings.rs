@@ -93,8 +93,8 @@ impl Crossed {
             on_the_other(model, all, &points[i], tested[1 - i])
         });
         Some(Self {
-            errors: [0, 1].map(|i| all_errors(model, &used[i], tested[i] as usize)),
-            normalised: [0, 1].map(|i| model.normalised_error(&used[i], tested[i] as usize)),
+            errors: [0, 1].map(|i| all_errors(model, &used[i].0, tested[i] as usize)),
+            normalised: used.map(|(_, error)| error),
             lengths: tested.map(|part| lengths(model, part as usize)),
             points,
             start: start.clone(),
